@@ -1,0 +1,468 @@
+"""Identification: the inverse of the term table, stage by stage.
+
+Every load of every run is one linear equation in the tabulated values::
+
+    F_measured = sum_j  scale_j m_j(state) C_j(state)  + error
+
+Stages follow ``data/tests.csv``. In each, the terms that the stage's tests identify are
+unknown; all other active terms of the same part are subtracted with the values already
+found (the corrected Eqs. A1-A6 are cases of this). Weighted least squares solves each
+stage, so that duplicated points are averaged with their weights; the covariance of
+everything found so far is carried through each subtraction.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from ident.campaign import DIRECT, Campaign, tests
+from sim.catalogue import OUTPUTS, Term
+from sim.forces import axis_values, boat_features, body_velocity, multiplier, plane_features
+from sim.parts import Mirror, Point, mirror_of, parts_of, vehicle_terms
+from sim.tables import Table
+
+Array = NDArray[np.float64]
+Key = tuple[str, str]
+
+
+@dataclass
+class Node:
+    """One unknown tabulated value: coefficient, part, point, and the runs behind it."""
+
+    name: str
+    part: str
+    point: Point
+    runs: list[str] = field(default_factory=list)
+    qualities: list[str] = field(default_factory=list)
+    worst: float = 0.0
+
+
+@dataclass
+class Equation:
+    """One measured load (or directly measured coefficient) of one run."""
+
+    run: pd.Series
+    output: str
+    value: float
+    sigma: float
+    unknowns: dict[int, float]
+    known: dict[int, float]
+
+
+@dataclass
+class Identification:
+    """Result of ``identify``.
+
+    Attributes
+    ----------
+    campaign : What was identified.
+    nodes : The tabulated values found, port/starboard folded onto one side.
+    values : (n,) coefficients.
+    covariance : (n, n) of ``values``.
+    unused : (run_id, file, row, output, reason) for every load that was not used.
+    warnings : (run_id or coefficient, message).
+    """
+
+    campaign: Campaign
+    nodes: list[Node]
+    values: Array
+    covariance: Array
+    unused: list[tuple[str, str, int, str, str]]
+    warnings: list[tuple[str, str]]
+
+    def points(self, term: Term, part: str) -> tuple[list[Point], list[int], list[int]]:
+        """Measured and mirrored points of a coefficient, their node and sign."""
+        return _points(self, term, part)
+
+
+def _key_point(values: list[float]) -> Point:
+    """Axis values that compare equal however they were computed."""
+    return tuple(float(f"{v:.10g}") + 0.0 for v in values)
+
+
+class _Solver:
+    """The growing set of nodes with their covariance."""
+
+    def __init__(self, campaign: Campaign) -> None:
+        self.campaign = campaign
+        self.vehicle = campaign.vehicle
+        self.terms = vehicle_terms(self.vehicle)
+        self.by_name = {t.name: t for t in self.terms}
+        self.planes = {p.name: p for p in self.vehicle.planes}
+        self.mirrors: dict[Key, Mirror] = {
+            (t.name, part): mirror_of(t, part, self.vehicle)
+            for t in self.terms
+            for part in parts_of(t, self.vehicle)
+        }
+        self.order = {k: i for i, k in enumerate(self.mirrors)}
+        self.nodes: list[Node] = []
+        self.index: dict[tuple[str, str, Point], int] = {}
+        self.values: Array = np.zeros(0)
+        self.covariance: Array = np.zeros((0, 0))
+        self.tables: dict[Key, tuple[Table, list[int], list[int]]] = {}
+        self.unused: list[tuple[str, str, int, str, str]] = []
+        self.warnings: list[tuple[str, str]] = []
+        particulars, fluid = self.vehicle.particulars, campaign.header.fluid
+        self.diameter = self.vehicle.propeller.diameter.value
+        self.scales = {
+            t.name: t.scale(fluid.density_kgpm3, particulars.length.value, self.diameter) for t in self.terms
+        }
+
+    # -- where a value stands ------------------------------------------------------------
+
+    def canonical(self, name: str, part: str, point: Point) -> tuple[tuple[str, str, Point], int]:
+        """The node a point folds onto, and its sign; sign 0 when symmetry makes it zero."""
+        mirror = self.mirrors[name, part]
+        image = (mirror.name, mirror.part, mirror.point(point))
+        here = (name, part, point)
+        if here == image:
+            return here, 1 if mirror.sign > 0 else 0
+        swapped = (self.order[image[:2]], [-x for x in image[2]]) < (self.order[here[:2]], [-x for x in point])
+        return (image, mirror.sign) if swapped else (here, 1)
+
+    def node(self, key: tuple[str, str, Point]) -> int:
+        if key not in self.index:
+            self.index[key] = len(self.nodes)
+            self.nodes.append(Node(*key))
+        return self.index[key]
+
+    def table(self, term: Term, part: str) -> tuple[Table, list[int], list[int]] | None:
+        """Table over the points found so far, with the node and sign of each point."""
+        key = (term.name, part)
+        if key not in self.tables:
+            points, nodes, signs = _points(self, term, part)
+            if not points:
+                return None
+            rules = tuple(term.extrapolation[a] for a in term.axes)
+            table = Table(term.axes, rules, np.array(points, dtype=float).reshape(len(points), -1))
+            self.tables[key] = (table, nodes, signs)
+        return self.tables[key]
+
+    def row(self, term: Term, part: str, features: dict[str, float]) -> dict[int, float] | None:
+        """Weights of the nodes in a known term's coefficient at a state."""
+        found = self.table(term, part)
+        if found is None:
+            return None
+        table, nodes, signs = found
+        weights = table.weights(axis_values(term, features)) * np.array(signs)
+        row: dict[int, float] = {}
+        for node, weight in zip(nodes, weights, strict=True):
+            if weight != 0.0:
+                row[node] = row.get(node, 0.0) + float(weight)
+        return row
+
+    # -- equations -----------------------------------------------------------------------
+
+    def features(self, run: pd.Series) -> dict[str, float]:
+        """Feature values of a run's state."""
+        zero = {k: 0.0 if pd.isna(run[k]) else float(run[k]) for k in ("U", "alpha", "beta", "p", "q", "r", "plane")}
+        velocity = body_velocity(zero["U"], zero["alpha"], zero["beta"])
+        rates = (zero["p"], zero["q"], zero["r"])
+        found = boat_features(velocity, rates, float(run["D0"]), float(run["n"]), float(run["J"]))
+        if run["part"] in self.planes:
+            found |= plane_features(self.planes[run["part"]], velocity, rates, zero["plane"])
+        for name in ("udot", "vdot", "wdot", "pdot", "qdot", "rdot"):
+            found[name] = 0.0 if pd.isna(run[name]) else float(run[name])
+        return found
+
+    def active(self, run: pd.Series, output: str, features: dict[str, float]) -> list[tuple[Term, float]]:
+        """Terms of the run's part that load this output in this state."""
+        found = []
+        for term in self.terms:
+            if term.output != output or run["part"] not in parts_of(term, self.vehicle):
+                continue
+            m = multiplier(term, features)
+            if m != 0.0 and not math.isnan(m):
+                found.append((term, m))
+        return found
+
+    def skip(self, run: pd.Series, output: str, reason: str) -> None:
+        self.unused.append((run["run_id"], run["file"], int(run["row"]), output, reason))
+
+    def load_equation(self, run: pd.Series, output: str, features: dict[str, float]) -> Equation | None:
+        unknowns: dict[int, float] = {}
+        known: dict[int, float] = {}
+        zero_by_symmetry = False
+        for term, m in self.active(run, output, features):
+            factor = self.scales[term.name] * m
+            if run["test"] in term.tests:
+                point = _key_point(axis_values(term, features))
+                key, sign = self.canonical(term.name, run["part"], point)
+                if sign == 0:
+                    zero_by_symmetry = True
+                    continue
+                node = self.node(key)
+                unknowns[node] = unknowns.get(node, 0.0) + sign * factor
+            elif run["decoupled"] != "True":
+                row = self.row(term, run["part"], features)
+                if row is None:
+                    self.warnings.append((run["run_id"], f"{term.name} acts on this run but no test identifies it: not subtracted"))
+                    continue
+                for node, weight in row.items():
+                    known[node] = known.get(node, 0.0) + factor * weight
+        value, sigma = float(run[output]), float(run[f"s_{output}"])
+        if unknowns:
+            return Equation(run, output, value, sigma, unknowns, known)
+        if zero_by_symmetry:
+            if abs(value) > 2.0 * sigma and value != 0.0:
+                self.warnings.append((run["run_id"], f"{output} = {value:g} where port/starboard symmetry makes it zero"))
+        elif value != 0.0:
+            self.skip(run, output, "no term of the vehicle's set acts on this load in this state")
+        return None
+
+    def equations(self, run: pd.Series) -> list[Equation]:
+        features = self.features(run)
+        excluded = run["exclude"].split()
+        found = []
+        for output in (*OUTPUTS, *DIRECT):
+            if pd.isna(run[output]):
+                continue
+            if output in excluded:
+                self.skip(run, output, run["reason"] or "excluded in the run file")
+                continue
+            if output in OUTPUTS:
+                equation = self.load_equation(run, output, features)
+            else:
+                term = self.by_name[output]
+                if run["test"] not in term.tests:
+                    self.skip(run, output, f"{output} is not taken from a {run['test']} run")
+                    continue
+                key, _ = self.canonical(term.name, term.part, _key_point(axis_values(term, features)))
+                sigma = float(run[f"s_{output}"])
+                equation = Equation(run, output, float(run[output]), sigma, {self.node(key): 1.0}, {})
+            if equation:
+                found.append(equation)
+        return found
+
+    # -- solution ------------------------------------------------------------------------
+
+    def solve(self, equations: list[Equation], first: int) -> None:
+        """Weighted least squares for the nodes from ``first`` on; carries the covariance."""
+        n_new, n_old = len(self.nodes) - first, first
+        if not n_new:
+            return
+        a = np.zeros((len(equations), n_new))
+        b = np.zeros((len(equations), n_old))
+        for i, equation in enumerate(equations):
+            for node, factor in equation.unknowns.items():
+                a[i, node - first] = factor
+            for node, factor in equation.known.items():
+                b[i, node] = factor
+        sigma = np.array([e.sigma for e in equations])
+        y = np.array([e.value for e in equations]) - b @ self.values
+        gain, lost = _gain(a, _weights(a, sigma))
+        for node in lost:
+            bad = self.nodes[first + node]
+            self.warnings.append((bad.name, f"{bad.part} at {bad.point}: the runs cannot tell it from other terms; dropped"))
+        new = gain @ y
+        noise = gain @ _error_covariance(equations, sigma) @ gain.T
+        cross = -gain @ b @ self.covariance
+        own = noise + gain @ b @ self.covariance @ b.T @ gain.T
+        self.covariance = np.block([[self.covariance, cross.T], [cross, own]])
+        self.values = np.concatenate([self.values, new])
+        self._record(equations, y - a @ new, a, gain, sigma)
+        self._forget(first, lost)
+
+    def _record(self, equations: list[Equation], residual: Array, a: Array, gain: Array, sigma: Array) -> None:
+        leverage = np.einsum("ij,ji->i", a, gain)
+        for i, equation in enumerate(equations):
+            spread = sigma[i] * math.sqrt(max(1.0 - leverage[i], 0.0))
+            free = leverage[i] < 1.0 - 1e-9
+            score = abs(residual[i]) / spread if free and spread > 0.0 else 0.0
+            for node in equation.unknowns:
+                record = self.nodes[node]
+                record.runs.append(equation.run["run_id"])
+                record.qualities.append(equation.run["quality"])
+                record.worst = max(record.worst, score)
+            if score > 2.0:
+                name = self.nodes[next(iter(equation.unknowns))].name
+                text = f"{name}: {equation.output} disagrees with runs at the same point by {score:.1f} standard errors"
+                self.warnings.append((equation.run["run_id"], text))
+
+    def _forget(self, first: int, lost: list[int]) -> None:
+        """Drop nodes that could not be identified."""
+        if not lost:
+            return
+        keep = [i for i in range(len(self.nodes)) if i - first not in lost]
+        self.nodes = [self.nodes[i] for i in keep]
+        self.index = {(n.name, n.part, n.point): i for i, n in enumerate(self.nodes)}
+        self.values, self.covariance = self.values[keep], self.covariance[np.ix_(keep, keep)]
+
+    def append(self, key: tuple[str, str, Point], value: float, variance: float, row: Array) -> int:
+        """Add one derived value with its covariance row against all others."""
+        node = self.node(key)
+        self.covariance = np.block([[self.covariance, row[:, None]], [row[None, :], np.array([[variance]])]])
+        self.values = np.append(self.values, value)
+        return node
+
+
+def _points(found: _Solver | Identification, term: Term, part: str) -> tuple[list[Point], list[int], list[int]]:
+    """Measured points of a coefficient and their mirror images.
+
+    Points that symmetry makes zero get sign 0 (any node).
+    """
+    vehicle = found.campaign.vehicle
+    mirror = mirror_of(term, part, vehicle)
+    back = mirror_of_name(found, mirror.name, mirror.part)
+    points: dict[Point, tuple[int, int]] = {}
+    for i, node in enumerate(found.nodes):
+        if (node.name, node.part) == (term.name, part):
+            points[node.point] = (i, 1)
+    for i, node in enumerate(found.nodes):
+        if (node.name, node.part) == (mirror.name, mirror.part):
+            points.setdefault(back.point(node.point), (i, back.sign))
+    if points and (mirror.name, mirror.part) == (term.name, part) and mirror.sign < 0:
+        flips = [k for k, s in enumerate(mirror.axis_signs) if s < 0]
+        for point, (i, _) in list(points.items()):
+            centre = tuple(0.0 if k in flips else x for k, x in enumerate(point))
+            if flips:
+                points.setdefault(centre, (i, 0))
+    places = sorted(points)
+    return places, [points[p][0] for p in places], [points[p][1] for p in places]
+
+
+def mirror_of_name(found: _Solver | Identification, name: str, part: str) -> Mirror:
+    """The mirror of a coefficient given by name."""
+    vehicle = found.campaign.vehicle
+    term = next(t for t in vehicle_terms(vehicle) if t.name == name)
+    return mirror_of(term, part, vehicle)
+
+
+def _weights(a: Array, sigma: Array) -> Array:
+    """1/sigma; runs without any error get the weight of the best run beside them."""
+    scale = np.abs(a).max(axis=1)
+    relative = sigma / scale
+    positive = relative[relative > 0.0]
+    least = 1e-3 * positive.min() if positive.size else 1.0
+    return 1.0 / (np.where(relative > 0.0, relative, least) * scale)
+
+
+def _gain(a: Array, weight: Array) -> tuple[Array, list[int]]:
+    """Weighted least-squares operator, block by block, and the columns it cannot find."""
+    n_rows, n_columns = a.shape
+    rows, columns = np.nonzero(a)
+    links = coo_array((np.ones(rows.size), (rows, n_rows + columns)), shape=(n_rows + n_columns,) * 2)
+    _, label = connected_components(links, directed=False)
+    gain = np.zeros((n_columns, n_rows))
+    lost: list[int] = []
+    for block in np.unique(label[n_rows:]):
+        r, c = np.flatnonzero(label[:n_rows] == block), np.flatnonzero(label[n_rows:] == block)
+        local = a[np.ix_(r, c)] * weight[r, None]
+        size = np.linalg.norm(local, axis=0)
+        u, s, vt = np.linalg.svd(local / size, full_matrices=False)
+        good = s > 1e-9 * s[0]
+        if good.sum() < c.size:
+            null = np.linalg.svd(local / size)[2][good.sum() :]
+            lost += [int(c[k]) for k in range(c.size) if np.abs(null[:, k]).max() > 1e-6]
+        inverse = (vt[good].T / s[good]) @ u[:, good].T
+        gain[np.ix_(c, r)] = inverse / size[:, None] * weight[r][None, :]
+    return gain, lost
+
+
+def _error_covariance(equations: list[Equation], sigma: Array) -> Array:
+    """Measurement covariance: copies of a run share its error, with the sign of the load."""
+    covariance = np.diag(sigma**2)
+    groups: dict[tuple[str, str], list[int]] = {}
+    for i, e in enumerate(equations):
+        groups.setdefault((e.run["copy_of"] or e.run["run_id"], e.output), []).append(i)
+    for members in groups.values():
+        for i in members:
+            for j in members:
+                if i != j:
+                    sign = np.sign(equations[i].value * equations[j].value)
+                    covariance[i, j] = sign * sigma[i] * sigma[j]
+    return covariance
+
+
+def _wake_fraction(solver: _Solver, run: pd.Series) -> None:
+    """Taylor wake fraction from the revolutions at self-propulsion, Eq. (48).
+
+    (1-t) KT(J) rho n^2 D^4 balances the hull and all undeflected planes;
+    w_T = 1 - J n D / U.
+    """
+    state = run.copy()
+    needed: dict[int, float] = {}
+    for part in ("hull", *solver.planes):
+        state["part"] = part
+        features = solver.features(state)
+        for term, m in solver.active(state, "X", features):
+            row = solver.row(term, part, features)
+            if row is None:
+                solver.skip(run, "n", f"{term.name} is not identified, so the resistance is incomplete")
+                return
+            for node, weight in row.items():
+                needed[node] = needed.get(node, 0.0) + solver.scales[term.name] * m * weight
+    thrust, deduction = solver.by_name["KT"], solver.by_name["t"]
+    features = solver.features(run)
+    t_row = solver.row(deduction, "propeller", features)
+    kt = solver.table(thrust, "propeller")
+    if t_row is None or kt is None:
+        solver.skip(run, "n", "no open-water curve or thrust deduction")
+        return
+    table, kt_nodes, _ = kt
+    involved = sorted({*needed, *t_row, *kt_nodes})
+
+    def wake(values: Array, n: float) -> float:
+        resistance = -sum(f * values[i] for i, f in needed.items())
+        t = sum(f * values[i] for i, f in t_row.items())
+        wanted = resistance / ((1.0 - t) * solver.scales["KT"] * n * abs(n))
+        order = np.argsort(table.points[:, 0])
+        j, k = table.points[order, 0], values[np.array(kt_nodes)[order]]
+        return 1.0 - float(np.interp(-wanted, -k, j)) * n * solver.diameter / float(run["U"])
+
+    n = float(run["n"])
+    value = wake(solver.values, n)
+    gradient = np.zeros(solver.values.size)
+    for i in involved:
+        step = 1e-6 * max(abs(solver.values[i]), 1e-6)
+        up, down = solver.values.copy(), solver.values.copy()
+        up[i] += step
+        down[i] -= step
+        gradient[i] = (wake(up, n) - wake(down, n)) / (2.0 * step)
+    dn = 1e-6 * n
+    by_n = (wake(solver.values, n + dn) - wake(solver.values, n - dn)) / (2.0 * dn)
+    row = gradient @ solver.covariance
+    variance = float(row @ gradient) + (by_n * float(run["rel_sigma"]) * n) ** 2
+    term = solver.by_name["w_T"]
+    node = solver.append((term.name, term.part, ()), value, variance, row)
+    solver.nodes[node].runs.append(run["run_id"])
+    solver.nodes[node].qualities.append(run["quality"])
+
+
+def identify(campaign: Campaign) -> Identification:
+    """Every coefficient the campaign supports, with covariance.
+
+    Parameters
+    ----------
+    campaign : From ``read_campaign``.
+
+    Returns
+    -------
+    Identification; runs that could not be used are listed with the reason.
+    """
+    solver = _Solver(campaign)
+    stages = tests()["stage"]
+    for stage in sorted(stages.unique()):
+        runs = campaign.runs[campaign.runs["test"].map(stages) == stage]
+        first = len(solver.nodes)
+        equations = [e for _, run in runs.iterrows() for e in solver.equations(run)]
+        solver.solve(equations, first)
+        solver.tables.clear()
+        speeds = runs[(runs["test"] == "self_propulsion") & runs["n"].notna()]
+        if "w_T" in solver.by_name and not speeds.empty:
+            if len(speeds) > 1:
+                solver.warnings.append(("w_T", f"taken from {speeds.iloc[0]['run_id']}; other self-propulsion revolutions not used"))
+            _wake_fraction(solver, speeds.iloc[0])
+            for _, run in speeds.iloc[1:].iterrows():
+                solver.skip(run, "n", "the wake fraction is taken from the first self-propulsion run that gives n")
+            solver.tables.clear()
+    return Identification(
+        campaign, solver.nodes, solver.values, solver.covariance, solver.unused, solver.warnings
+    )

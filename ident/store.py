@@ -1,0 +1,140 @@
+"""Write the coefficient database: one fit, one commit, or nothing."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from ident import __version__
+from ident.identify import Identification
+from sim.database import COUNTS, NUMBERS, axis_columns, column_order, read_rows, to_column, versions
+from sim.errors import InputError
+from sim.parts import parts_of, vehicle_terms
+
+_ORIGIN = {1: "measured", -1: "measured", 0: "symmetry"}
+
+
+def database_rows(found: Identification) -> pd.DataFrame:
+    """The rows of the database for one identified campaign, completed by symmetry.
+
+    Parameters
+    ----------
+    found : From ``identify``.
+
+    Returns
+    -------
+    One row a tabulated value, columns as ``sim.database.column_order``.
+
+    Raises
+    ------
+    InputError
+        When the campaign identifies nothing, or a value is not finite.
+    """
+    vehicle = found.campaign.vehicle
+    columns = {axis: column for column, axis in axis_columns().items()}
+    factor = {k: q.factor for k, q in found.campaign.header.quality.items()}
+    stderr = np.sqrt(np.clip(np.diag(found.covariance), 0.0, None))
+    rows = []
+    for term in vehicle_terms(vehicle):
+        for part in parts_of(term, vehicle):
+            for point, index, sign in zip(*found.points(term, part), strict=True):
+                node = found.nodes[index]
+                own = (node.name, node.part, node.point) == (term.name, part, point)
+                row = {"vehicle": vehicle.name, "coefficient": term.name, "part": part, "output": term.output}
+                row |= {columns[a]: to_column(columns[a], x) for a, x in zip(term.axes, point, strict=True)}
+                row |= {
+                    "value": sign * found.values[index] + 0.0,
+                    "stderr": abs(sign) * stderr[index],
+                    "n_runs": len(set(node.runs)) if sign else 0,
+                    "quality": max(node.qualities, key=lambda q: factor[q]) if sign else "",
+                    "origin": _ORIGIN[sign] if own or not sign else "mirror",
+                    "estimate": index if sign else -1,
+                    "worst_residual": node.worst if sign else 0.0,
+                    "extrapolation": " ".join(f"{a}:{r}" for a, r in term.extrapolation.items()),
+                    "equation": term.equation,
+                    "runs": " ".join(dict.fromkeys(node.runs)) if sign else "",
+                }
+                rows.append(row)
+    if not rows:
+        raise InputError(found.campaign.header.name, "the runs identify nothing", "runs of at least one known test")
+    table = pd.DataFrame(rows).reindex(columns=column_order())
+    for row in table[~np.isfinite(table[list(NUMBERS)]).all(axis=1)].to_dict("records"):
+        raise InputError(found.campaign.header.name, f"{row['coefficient']} of {row['part']} is not finite", "finite loads and errors")
+    return table
+
+
+def digest(rows: pd.DataFrame) -> str:
+    """SHA-256 of the content of database rows, independent of their order."""
+    text = []
+    for row in rows[column_order()].itertuples(index=False):
+        cells = ["" if isinstance(x, float) and math.isnan(x) or x is None else repr(x) for x in row]
+        text.append("\t".join(cells))
+    return hashlib.sha256("\n".join(sorted(text)).encode()).hexdigest()
+
+
+def _arrow(rows: pd.DataFrame) -> object:
+    import pyarrow as pa
+
+    numbers = {*NUMBERS, *axis_columns()}
+    fields = [
+        pa.field(c, pa.float64() if c in numbers else pa.int64() if c in COUNTS else pa.string())
+        for c in column_order()
+    ]
+    return pa.Table.from_pandas(rows[column_order()], schema=pa.schema(fields), preserve_index=False)
+
+
+def commit(path: str, rows: pd.DataFrame, metadata: dict[str, str]) -> tuple[int, bool]:
+    """Commit one vehicle's rows as a new version.
+
+    Parameters
+    ----------
+    path : Folder or object-store URL of the database; created when absent.
+    rows : From ``database_rows``; replace the same vehicle's rows, keep other vehicles'.
+    metadata : Stored with the commit beside digest, program version and parent.
+
+    Returns
+    -------
+    Version number, and False when the content equals the latest version's.
+
+    Raises
+    ------
+    InputError
+        When the path cannot hold a database, or another fit committed at the same time.
+    """
+    from deltalake import CommitProperties, write_deltalake
+    from deltalake.exceptions import CommitFailedError, DeltaError
+
+    local = Path(path)
+    if "://" not in path and local.exists() and not local.is_dir():
+        raise InputError(path, "a file", "a folder for the database")
+    content = digest(rows)
+    vehicle = str(rows["vehicle"].iloc[0])
+    exists = "://" in path or (local / "_delta_log").is_dir()
+    parent = ""
+    if exists:
+        history = versions(path)
+        parent = str(history[-1].number)
+        try:
+            present, number = read_rows(path, vehicle=vehicle)
+            if digest(present) == content:
+                return number, False
+        except InputError:
+            pass
+    properties = {**metadata, "digest": content, "program": f"ident {__version__}", "parent": parent, "vehicle": vehicle}
+    try:
+        write_deltalake(
+            path,
+            _arrow(rows),
+            mode="overwrite" if exists else "error",
+            predicate=f"vehicle = '{vehicle}'" if exists else None,
+            commit_properties=CommitProperties(custom_metadata=properties),
+        )
+    except (CommitFailedError, DeltaError) as error:
+        raise InputError(path, f"another fit wrote at the same time: {error}", "run the fit again") from error
+    except OSError as error:
+        raise InputError(path, f"cannot be written: {error}", "a folder you may write to") from error
+    return versions(path)[-1].number, True

@@ -1,0 +1,1 @@
+"""Six-degree-of-freedom submarine simulator driven by a tabulated coefficient database."""

@@ -1,0 +1,136 @@
+"""The contract between identification and simulation: rows of the coefficient database.
+
+One tidy row a tabulated value. The axis columns come from the term table, so the schema
+has no list of its own. A version is one commit of a Delta Lake table.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from sim import catalogue
+from sim.errors import InputError
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+# Columns beside the axes, with their meaning.
+COLUMNS = {
+    "vehicle": "vehicle name",
+    "coefficient": "symbol in the term table",
+    "part": "part of the boat that carries the load",
+    "output": "load component, X Y Z K M N, empty for t and w_T",
+    "value": "prime (dimensionless) coefficient, program frame",
+    "stderr": "standard error of the value",
+    "n_runs": "number of runs behind the value",
+    "quality": "worst quality word among those runs",
+    "origin": "measured, mirror (port/starboard image) or symmetry (zero by it)",
+    "estimate": "values with the same number are one estimate",
+    "worst_residual": "largest disagreement among the runs, in standard errors",
+    "extrapolation": "rule beyond the data, axis by axis",
+    "equation": "equations of the source",
+    "runs": "run ids behind the value",
+}
+NUMBERS = ("value", "stderr", "worst_residual")
+COUNTS = ("n_runs", "estimate")
+
+
+def axis_columns() -> dict[str, str]:
+    """Database column -> axis name, in the order of the axes table."""
+    return {a.column: name for name, a in catalogue.axes().items()}
+
+
+def from_column(column: str, value: float) -> float:
+    """Axis value of a database column in radians or SI."""
+    return math.radians(value) if column.endswith("_deg") else value
+
+
+def to_column(column: str, value: float) -> float:
+    """Database value of an axis value in radians or SI."""
+    return float(f"{math.degrees(value):.10g}") if column.endswith("_deg") else value
+
+
+def column_order() -> list[str]:
+    """All columns in the order they are stored."""
+    first = ["vehicle", "coefficient", "part", "output"]
+    return [*first, *axis_columns(), *[c for c in COLUMNS if c not in first]]
+
+
+@dataclass(frozen=True)
+class Version:
+    """One commit of the database."""
+
+    number: int
+    timestamp: str
+    metadata: dict[str, str]
+
+    @property
+    def digest(self) -> str:
+        """Content digest of the version's rows."""
+        return self.metadata.get("digest", "")
+
+
+def open_table(path: str, version: int | None = None) -> Any:
+    """The Delta table at ``path``, at a version.
+
+    Raises
+    ------
+    InputError
+        When there is no database there, or no such version.
+    """
+    from deltalake import DeltaTable
+    from deltalake.exceptions import DeltaError, TableNotFoundError
+
+    local = Path(path)
+    if "://" not in path and not (local / "_delta_log").is_dir():
+        found = "a file" if local.is_file() else "no coefficient database"
+        raise InputError(path, found, "a database written by `ident fit`; choose it with --db")
+    try:
+        table = DeltaTable(path)
+    except (TableNotFoundError, DeltaError, OSError) as error:
+        raise InputError(path, f"not a coefficient database: {error}", "a database written by `ident fit`") from error
+    latest = table.version()
+    if version is not None:
+        if not 0 <= version <= latest:
+            raise InputError(path, f"version {version} does not exist", f"0 to {latest}; see `ident versions`")
+        table.load_as_version(version)
+    return table
+
+
+def read_rows(path: str, version: int | None = None, vehicle: str | None = None) -> tuple[pd.DataFrame, int]:
+    """Rows of one version and its number.
+
+    Parameters
+    ----------
+    path : Folder or object-store URL of the database.
+    version : Version number, latest when None.
+    vehicle : Keep only this vehicle's rows.
+
+    Raises
+    ------
+    InputError
+        When database, version or vehicle do not exist.
+    """
+    table = open_table(path, version)
+    rows = table.to_pyarrow_table().to_pandas()
+    if vehicle is not None:
+        known = sorted(rows["vehicle"].unique())
+        rows = rows[rows["vehicle"] == vehicle]
+        if rows.empty:
+            raise InputError(path, f"no coefficients of vehicle {vehicle!r}", ", ".join(known))
+    order = ["vehicle", "coefficient", "part", *axis_columns()]
+    return rows.sort_values(order, kind="stable").reset_index(drop=True), int(table.version())
+
+
+def versions(path: str) -> list[Version]:
+    """Every version of a database, oldest first. Raises ``InputError`` when there is none."""
+    table = open_table(path)
+    found = []
+    for entry in table.history():
+        metadata = {k: str(v) for k, v in entry.items() if k not in ("version", "timestamp")}
+        stamp = entry.get("timestamp", "")
+        found.append(Version(int(entry["version"]), str(stamp), metadata))
+    return sorted(found, key=lambda v: v.number)

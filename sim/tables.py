@@ -1,0 +1,268 @@
+"""Tables over measured points: completion of ragged grids, interpolation, extrapolation.
+
+A table keeps its measured points. Everything derived from them is *linear* in the
+measured values, so that a value at any state is a weighted sum of measured values and its
+standard error follows from the same weights.
+
+* Between points: multilinear (linear in depth, as in the source).
+* Grid nodes no run covers: interpolated along a measured line where one brackets the
+  node, else completed without interaction, C(a,b) = C(a,b0) + C(a0,b) - C(a0,b0), from the
+  nearest runs; this is the source's superposition X'(alpha) + X'(beta).
+* Beyond the points, per axis: ``hold``; ``linear`` (the coefficient goes on straight);
+  ``linear_load`` (coefficient times axis goes on straight, so the coefficient tends to a
+  constant); ``drift_odd`` and ``drift_even``: Eq. (25) matched in value and slope at the
+  last run, C0 cos^2 + A sin cos + B sin|sin| for in-plane loads, A cos^2 + B sin^2 for
+  out-of-plane loads, up to 90 deg.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+# Where the tabulated continuation of a drift rule has nodes: the run spacing up to 30 deg,
+# then coarser. A discretisation, not a property of a boat.
+_FINE_TO = np.radians(30.0)
+_COARSE = np.radians([40.0, 50.0, 60.0, 75.0, 90.0])
+
+
+def axis_weights(nodes: Array, rule: str, x: float) -> Array:
+    """Interpolation weights of one axis.
+
+    Parameters
+    ----------
+    nodes : (n,) increasing axis values.
+    rule : Extrapolation rule; drift rules hold beyond their own continuation nodes.
+    x : Where to evaluate.
+
+    Returns
+    -------
+    (n,) weights that sum to one.
+    """
+    weights = np.zeros(nodes.size)
+    if nodes.size == 1:
+        weights[0] = 1.0
+        return weights
+    i = int(np.clip(np.searchsorted(nodes, x, side="right") - 1, 0, nodes.size - 2))
+    a, b = nodes[i], nodes[i + 1]
+    if a <= x <= b or rule == "linear":
+        t = (x - a) / (b - a)
+    elif rule == "linear_load" and a * b > 0.0 and x * a > 0.0:
+        t = (1.0 / x - 1.0 / a) / (1.0 / b - 1.0 / a)
+    else:
+        t = 0.0 if x < a else 1.0
+    weights[i], weights[i + 1] = 1.0 - t, t
+    return weights
+
+
+def _drift_row(nodes: Array, rule: str, x: float) -> Array:
+    """Weights of the nodes for Eq. (25) continued to ``x`` beyond the last node."""
+    edge, inner = (-1, -2) if x > 0 else (0, 1)
+    e = nodes[edge]
+    slope = np.zeros(nodes.size)
+    slope[edge], slope[inner] = 1.0, -1.0
+    slope /= e - nodes[inner]
+    value = np.zeros(nodes.size)
+    value[edge] = 1.0
+    s2 = np.sin(2.0 * e)
+    if rule == "drift_even":
+        basis = np.array([[np.cos(e) ** 2, np.sin(e) ** 2], [-s2, s2]])
+        at_x = np.array([np.cos(x) ** 2, np.sin(x) ** 2])
+        return at_x @ np.linalg.solve(basis, np.stack([value, slope]))
+    centre = axis_weights(nodes, "hold", 0.0)
+    basis = np.array([[0.5 * s2, np.sin(e) * abs(np.sin(e))], [np.cos(2.0 * e), abs(s2)]])
+    rest = np.stack([value - np.cos(e) ** 2 * centre, slope + s2 * centre])
+    at_x = np.array([0.5 * np.sin(2.0 * x), np.sin(x) * abs(np.sin(x))])
+    return np.cos(x) ** 2 * centre + at_x @ np.linalg.solve(basis, rest)
+
+
+def extend_axis(nodes: Array, rule: str) -> tuple[Array, Array]:
+    """Continuation nodes of a drift axis.
+
+    Parameters
+    ----------
+    nodes : (n,) increasing angles [rad].
+    rule : ``drift_odd``, ``drift_even``, or another rule (nothing is added).
+
+    Returns
+    -------
+    extended : (m,) axis values, m >= n.
+    matrix : (m, n) values at ``extended`` from values at ``nodes``.
+    """
+    if not rule.startswith("drift") or nodes.size < 3 or nodes[-1] >= _FINE_TO:
+        return nodes, np.eye(nodes.size)
+    extra: list[float] = []
+    for sign, edge, step in (
+        (-1.0, -nodes[0], nodes[1] - nodes[0]),
+        (1.0, nodes[-1], nodes[-1] - nodes[-2]),
+    ):
+        if edge <= 0.0:
+            continue
+        fine = np.arange(edge + step, _FINE_TO + 0.5 * step, step)
+        last = fine[-1] if fine.size else edge
+        extra += list(sign * fine) + [sign * c for c in _COARSE if c > last]
+    extended = np.sort(np.concatenate([nodes, extra]))
+    matrix = np.zeros((extended.size, nodes.size))
+    for row, x in zip(matrix, extended, strict=True):
+        inside = nodes[0] <= x <= nodes[-1]
+        row[:] = axis_weights(nodes, "hold", x) if inside else _drift_row(nodes, rule, x)
+    return extended, matrix
+
+
+def _line_interpolation(index: tuple[int, ...], axes: Sequence[Array], measured: NDArray[np.bool_]):
+    """(node, weight) pairs for a node bracketed by runs along one axis, else None."""
+    for k, nodes in enumerate(axes):
+        line = measured[(*index[:k], slice(None), *index[k + 1 :])]
+        below, above = np.flatnonzero(line[: index[k]]), np.flatnonzero(line[index[k] :])
+        if below.size and above.size:
+            lo, hi = int(below[-1]), int(above[0]) + index[k]
+            t = (nodes[index[k]] - nodes[lo]) / (nodes[hi] - nodes[lo])
+            place = [(*index[:k], i, *index[k + 1 :]) for i in (lo, hi)]
+            return [(place[0], 1.0 - t), (place[1], t)]
+    return None
+
+
+def _without_interaction(index: tuple[int, ...], known: NDArray[np.bool_]):
+    """(node, weight) triple C(a,b0) + C(a0,b) - C(a0,b0) from the nearest known nodes."""
+    best, found = None, None
+    for j, k in itertools.combinations(range(len(index)), 2):
+        for a in range(known.shape[j]):
+            for b in range(known.shape[k]):
+                if a == index[j] or b == index[k]:
+                    continue
+                distance = abs(a - index[j]) + abs(b - index[k])
+                if best is not None and distance >= best:
+                    continue
+                keep_j, keep_k, neither = list(index), list(index), list(index)
+                keep_j[k], keep_k[j], neither[j], neither[k] = b, a, a, b
+                triple = [tuple(keep_j), tuple(keep_k), tuple(neither)]
+                if all(known[t] for t in triple):
+                    best, found = distance, list(zip(triple, (1.0, 1.0, -1.0), strict=True))
+    return found
+
+
+@lru_cache(maxsize=256)
+def _complete(points: bytes, shape: tuple[int, int]) -> tuple[tuple[Array, ...], Array, NDArray[np.bool_]]:
+    """Grid axes, completion matrix (nodes x points) and mask of the measured nodes."""
+    x = np.frombuffer(points).reshape(shape)
+    axes = tuple(np.unique(x[:, k]) for k in range(shape[1]))
+    grid = tuple(a.size for a in axes)
+    matrix = np.zeros((*grid, shape[0]))
+    measured = np.zeros(grid, dtype=bool)
+    for row, point in enumerate(x):
+        index = tuple(int(np.searchsorted(a, c)) for a, c in zip(axes, point, strict=True))
+        matrix[index][row] = 1.0
+        measured[index] = True
+    known = measured.copy()
+    missing = [i for i in np.ndindex(*grid) if not known[i]]
+    for attempt in range(1 + sum(grid)):
+        snapshot, left = known.copy(), []
+        for index in missing:
+            first = attempt == 0
+            parts = _line_interpolation(index, axes, measured) if first else _without_interaction(index, snapshot)
+            if parts is None:
+                left.append(index)
+                continue
+            matrix[index] = sum(w * matrix[i] for i, w in parts)
+            known[index] = True
+        if not left or (attempt and len(left) == len(missing)):
+            missing = left
+            break
+        missing = left
+    centres = np.argwhere(measured)
+    for index in missing:
+        nearest = centres[np.argmin(np.abs(centres - np.array(index)).sum(axis=1))]
+        matrix[index] = matrix[tuple(nearest)]
+    return axes, matrix.reshape(-1, shape[0]), measured.reshape(-1)
+
+
+@dataclass(frozen=True)
+class Table:
+    """A coefficient's tabulation over its measured points.
+
+    Attributes
+    ----------
+    axes : Axis names, d of them; d = 0 is a constant.
+    rules : Extrapolation rule of each axis.
+    points : (n, d) measured points; angles in radians, the rest in SI.
+    """
+
+    axes: tuple[str, ...]
+    rules: tuple[str, ...]
+    points: Array
+
+    @cached_property
+    def _completed(self) -> tuple[tuple[Array, ...], Array, NDArray[np.bool_]]:
+        points = np.ascontiguousarray(self.points, dtype=float)
+        return _complete(points.tobytes(), (points.shape[0], points.shape[1]))
+
+    @property
+    def nodes(self) -> tuple[Array, ...]:
+        """Axis values of the completed grid."""
+        return self._completed[0]
+
+    @property
+    def completion(self) -> Array:
+        """(grid nodes, n) matrix from measured values to grid values."""
+        return self._completed[1]
+
+    @property
+    def measured(self) -> NDArray[np.bool_]:
+        """(grid nodes,) True where a run stands."""
+        return self._completed[2]
+
+    @cached_property
+    def extension(self) -> tuple[tuple[Array, Array], ...]:
+        """Extended axis values and extension matrix of each axis."""
+        return tuple(extend_axis(n, r) for n, r in zip(self.nodes, self.rules, strict=True))
+
+    def grid_weights(self, x: Sequence[float]) -> Array:
+        """(grid nodes,) weights of the completed grid at the state ``x`` (d,)."""
+        weights = np.ones(1)
+        for (extended, matrix), rule, value in zip(self.extension, self.rules, x, strict=True):
+            along = axis_weights(extended, rule, float(value)) @ matrix
+            weights = np.multiply.outer(weights, along).reshape(-1)
+        return weights
+
+    def weights(self, x: Sequence[float]) -> Array:
+        """(n,) weights of the measured values at the state ``x`` (d,)."""
+        if not self.axes:
+            return np.ones(1)
+        return self.grid_weights(x) @ self.completion
+
+    def covered(self, x: Sequence[float]) -> float:
+        """Share of the interpolation weight at ``x`` that rests on runs, 0 to 1."""
+        if not self.axes:
+            return 1.0
+        weights = np.abs(self.grid_weights(x))
+        return float(weights[self.measured].sum() / weights.sum())
+
+    def grid(self, values: Array) -> Array:
+        """Values on the extended grid.
+
+        Parameters
+        ----------
+        values : (n,) values at the measured points.
+
+        Returns
+        -------
+        Array with one dimension an axis.
+        """
+        if not self.axes:
+            return np.asarray(values, dtype=float).reshape(())
+        out = (self.completion @ values).reshape([n.size for n in self.nodes])
+        for k, (_, matrix) in enumerate(self.extension):
+            out = np.moveaxis(np.tensordot(matrix, out, axes=(1, k)), 0, k)
+        return out
+
+    def range(self, axis: str) -> tuple[float, float]:
+        """Smallest and largest measured value along an axis (radians or SI)."""
+        column = self.points[:, self.axes.index(axis)]
+        return float(column.min()), float(column.max())

@@ -1,0 +1,214 @@
+"""A vehicle is data: particulars, planes, propeller, sections and its term set."""
+
+from __future__ import annotations
+
+import tomllib
+from importlib.resources import files
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
+
+from sim.errors import InputError, explain
+from sim.frames import Frame, FrameError
+
+Vector = Annotated[list[float], Field(min_length=3, max_length=3)]
+
+
+class _Data(BaseModel):
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
+
+
+class Number(_Data):
+    """A number with its unit and where it comes from."""
+
+    value: float
+    unit: str
+    source: str
+
+
+class Triple(_Data):
+    """A vector with its unit and where it comes from."""
+
+    value: Vector
+    unit: str
+    source: str
+
+
+class Limits(_Data):
+    """A lower and an upper limit with unit and source."""
+
+    value: Annotated[list[float], Field(min_length=2, max_length=2)]
+    unit: str
+    source: str
+
+
+class Particulars(_Data):
+    """Mass, inertia and reference points; positions from the body origin."""
+
+    length: Number
+    mass: Number
+    displaced_mass: Number
+    radius_of_gyration: Triple
+    centre_of_gravity: Triple
+    centre_of_buoyancy: Triple
+    sail_top: Triple
+
+
+class Propeller(_Data):
+    """Propeller diameter and the limits of its revolutions."""
+
+    name: str
+    diameter: Number
+    limits: Limits
+    rate: Number
+
+
+class Mixer(_Data):
+    """Share of the vertical and horizontal command in a plane's deflection, Eq. (1)."""
+
+    dV: float
+    dH: float
+
+
+class Plane(_Data):
+    """One control plane: where it is, how it turns, what limits it."""
+
+    name: str
+    where: str
+    position: Vector
+    span_axis: Vector
+    leading_edge: Vector
+    mirror: str
+    mixer: Mixer
+    limit_deg: Annotated[float, Field(gt=0)]
+    rate_degps: Annotated[float, Field(gt=0)]
+    source: str
+
+    @property
+    def lift_axis(self) -> np.ndarray:
+        """Unit normal n = b x p along which positive deflection lifts, Eq. (32)."""
+        normal = np.cross(self.span_axis, self.leading_edge)
+        return normal / np.linalg.norm(normal)
+
+
+class Section(_Data):
+    """Centre of one added-mass section."""
+
+    name: str
+    position: Vector
+
+
+class Sections(_Data):
+    """The added-mass sections of Table 6."""
+
+    source: str
+    centres: list[Section]
+
+
+class Axes(_Data):
+    """Declared directions of the body axes and what the origin is."""
+
+    x: str
+    y: str
+    z: str
+    origin: str
+
+    @property
+    def frame(self) -> Frame:
+        """The declared frame."""
+        return Frame(self.x, self.y, self.z)
+
+
+class Vehicle(_Data):
+    """A vehicle file, turned to the program frame by ``load_vehicle``."""
+
+    name: str
+    title: str
+    source: str
+    term_set: Literal["reduced", "gertler_hagen"]
+    added_mass: Literal["sections", "derivatives"]
+    frame: Axes
+    particulars: Particulars
+    propeller: Propeller
+    planes: list[Plane] = []
+    sections: Sections | None = None
+
+    @field_validator("planes")
+    @classmethod
+    def _mirrors_exist(cls, planes: list[Plane]) -> list[Plane]:
+        names = {p.name for p in planes}
+        for plane in planes:
+            if plane.mirror not in names:
+                raise ValueError(f"plane {plane.name} mirrors {plane.mirror!r}, which is not a plane")
+        return planes
+
+    def turned(self, frame: Frame) -> Vehicle:
+        """The same vehicle described in another frame (program frame to ``frame`` or back)."""
+        data: dict[str, Any] = self.model_dump()
+        signs = [self.frame.frame.signs[a] * frame.signs[a] for a in "xyz"]
+
+        def turn(vector: list[float]) -> list[float]:
+            return [s * v + 0.0 for s, v in zip(signs, vector, strict=True)]
+
+        data["frame"].update(x=frame.x, y=frame.y, z=frame.z)
+        for key in ("centre_of_gravity", "centre_of_buoyancy", "sail_top"):
+            data["particulars"][key]["value"] = turn(data["particulars"][key]["value"])
+        for plane in data["planes"]:
+            for key in ("position", "span_axis", "leading_edge"):
+                plane[key] = turn(plane[key])
+        for section in (data["sections"] or {"centres": []})["centres"]:
+            section["position"] = turn(section["position"])
+        return Vehicle.model_validate(data)
+
+    def part_names(self) -> list[str]:
+        """Every part of the boat that a run may carry loads of."""
+        sections = [s.name for s in self.sections.centres] if self.sections else []
+        return ["hull", "propeller", *[p.name for p in self.planes], *sections]
+
+
+def bundled(kind: str) -> list[str]:
+    """Names of the bundled ``vehicles`` or ``cases``."""
+    return sorted(p.name[:-5] for p in (files("sim") / kind).iterdir() if p.name.endswith(".toml"))
+
+
+def read_toml(name: str | Path, kind: str) -> tuple[dict[str, Any], str]:
+    """A bundled name or a path to a TOML file, as data and the name to report.
+
+    Raises
+    ------
+    InputError
+        When neither a bundled file nor a readable TOML file of that name exists.
+    """
+    path = Path(name)
+    if path.suffix != ".toml" and str(name) in bundled(kind):
+        return tomllib.loads((files("sim") / kind / f"{name}.toml").read_text("utf-8")), str(name)
+    if not path.is_file():
+        raise InputError(str(name), "no such file or bundled name", f"one of {', '.join(bundled(kind))}, or a path")
+    try:
+        return tomllib.loads(path.read_text("utf-8")), str(path)
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise InputError(str(path), f"not TOML: {error}", "a TOML file in UTF-8") from error
+
+
+def load_vehicle(name: str | Path = "bb2") -> Vehicle:
+    """Read a vehicle and turn it to the program frame.
+
+    Parameters
+    ----------
+    name : Bundled name or path to a vehicle file.
+
+    Raises
+    ------
+    InputError
+        For a missing file, a missing or unknown key, or a value out of range.
+    """
+    data, where = read_toml(name, "vehicles")
+    try:
+        vehicle = Vehicle.model_validate(data)
+        return vehicle.turned(Frame())
+    except ValidationError as error:
+        raise explain(where, error) from error
+    except FrameError as error:
+        raise InputError(where, str(error), "a right-handed frame") from error
