@@ -174,7 +174,9 @@ def _numbers(path: Path, table: pd.DataFrame, column: str, factor: float) -> pd.
     bad = (text != "") & ~np.isfinite(values)
     if bad.any():
         i = int(np.flatnonzero(bad.to_numpy())[0])
-        raise InputError(f"{path}, row {i + 2}, column {column}", repr(table[column].iloc[i]), "a finite number, or blank")
+        raise InputError(
+            f"{path}, row {i + 2}, column {column}", repr(table[column].iloc[i]), "a finite number, or blank"
+        )
     return values * factor
 
 
@@ -183,9 +185,7 @@ def _check_words(path: Path, table: pd.DataFrame, allowed: dict[str, list[str]])
         bad = ~table[column].isin(words)
         if bad.any():
             i = int(np.flatnonzero(bad.to_numpy())[0])
-            raise InputError(
-                f"{path}, row {i + 2}, column {column}", repr(table[column].iloc[i]), ", ".join(words)
-            )
+            raise InputError(f"{path}, row {i + 2}, column {column}", repr(table[column].iloc[i]), ", ".join(words))
 
 
 def read_runs(path: Path, header: CampaignFile, vehicle: Vehicle) -> pd.DataFrame:
@@ -356,12 +356,16 @@ def _check_copies(folder: Path, runs: pd.DataFrame) -> None:
     if not repeated.empty:
         run = repeated.iloc[0]
         raise InputError(
-            f"{folder / run['file']}, row {run['row']}, column run_id", repr(run["run_id"]), "each run_id once a campaign"
+            f"{folder / run['file']}, row {run['row']}, column run_id",
+            repr(run["run_id"]),
+            "each run_id once a campaign",
         )
     known = {*runs["run_id"], ""}
     for _, run in runs[~runs["copy_of"].isin(known)].iterrows():
         raise InputError(
-            f"{folder / run['file']}, row {run['row']}, column copy_of", repr(run["copy_of"]), "the run_id of another run"
+            f"{folder / run['file']}, row {run['row']}, column copy_of",
+            repr(run["copy_of"]),
+            "the run_id of another run",
         )
 
 

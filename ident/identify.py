@@ -97,9 +97,7 @@ class _Solver:
         self.by_name = {t.name: t for t in self.terms}
         self.planes = {p.name: p for p in self.vehicle.planes}
         self.mirrors: dict[Key, Mirror] = {
-            (t.name, part): mirror_of(t, part, self.vehicle)
-            for t in self.terms
-            for part in parts_of(t, self.vehicle)
+            (t.name, part): mirror_of(t, part, self.vehicle) for t in self.terms for part in parts_of(t, self.vehicle)
         }
         self.order = {k: i for i, k in enumerate(self.mirrors)}
         self.nodes: list[Node] = []
@@ -203,7 +201,9 @@ class _Solver:
             elif run["decoupled"] != "True":
                 row = self.row(term, run["part"], features)
                 if row is None:
-                    self.warnings.append((run["run_id"], f"{term.name} acts on this run but no test identifies it: not subtracted"))
+                    self.warnings.append(
+                        (run["run_id"], f"{term.name} acts on this run but no test identifies it: not subtracted")
+                    )
                     continue
                 for node, weight in row.items():
                     known[node] = known.get(node, 0.0) + factor * weight
@@ -212,7 +212,9 @@ class _Solver:
             return Equation(run, output, value, sigma, unknowns, known)
         if zero_by_symmetry:
             if abs(value) > 2.0 * sigma and value != 0.0:
-                self.warnings.append((run["run_id"], f"{output} = {value:g} where port/starboard symmetry makes it zero"))
+                self.warnings.append(
+                    (run["run_id"], f"{output} = {value:g} where port/starboard symmetry makes it zero")
+                )
         elif value != 0.0:
             self.skip(run, output, "no term of the vehicle's set acts on this load in this state")
         return None
@@ -260,7 +262,9 @@ class _Solver:
         gain, lost = _gain(a, _weights(a, sigma))
         for node in lost:
             bad = self.nodes[first + node]
-            self.warnings.append((bad.name, f"{bad.part} at {bad.point}: the runs cannot tell it from other terms; dropped"))
+            self.warnings.append(
+                (bad.name, f"{bad.part} at {bad.point}: the runs cannot tell it from other terms; dropped")
+            )
         new = gain @ y
         noise = gain @ _error_covariance(equations, sigma) @ gain.T
         cross = -gain @ b @ self.covariance
@@ -458,11 +462,11 @@ def identify(campaign: Campaign) -> Identification:
         speeds = runs[(runs["test"] == "self_propulsion") & runs["n"].notna()]
         if "w_T" in solver.by_name and not speeds.empty:
             if len(speeds) > 1:
-                solver.warnings.append(("w_T", f"taken from {speeds.iloc[0]['run_id']}; other self-propulsion revolutions not used"))
+                solver.warnings.append(
+                    ("w_T", f"taken from {speeds.iloc[0]['run_id']}; other self-propulsion revolutions not used")
+                )
             _wake_fraction(solver, speeds.iloc[0])
             for _, run in speeds.iloc[1:].iterrows():
                 solver.skip(run, "n", "the wake fraction is taken from the first self-propulsion run that gives n")
             solver.tables.clear()
-    return Identification(
-        campaign, solver.nodes, solver.values, solver.covariance, solver.unused, solver.warnings
-    )
+    return Identification(campaign, solver.nodes, solver.values, solver.covariance, solver.unused, solver.warnings)

@@ -63,7 +63,11 @@ def database_rows(found: Identification) -> pd.DataFrame:
         raise InputError(found.campaign.header.name, "the runs identify nothing", "runs of at least one known test")
     table = pd.DataFrame(rows).reindex(columns=column_order())
     for row in table[~np.isfinite(table[list(NUMBERS)]).all(axis=1)].to_dict("records"):
-        raise InputError(found.campaign.header.name, f"{row['coefficient']} of {row['part']} is not finite", "finite loads and errors")
+        raise InputError(
+            found.campaign.header.name,
+            f"{row['coefficient']} of {row['part']} is not finite",
+            "finite loads and errors",
+        )
     return table
 
 
@@ -71,7 +75,7 @@ def digest(rows: pd.DataFrame) -> str:
     """SHA-256 of the content of database rows, independent of their order."""
     text = []
     for row in rows[column_order()].itertuples(index=False):
-        cells = ["" if isinstance(x, float) and math.isnan(x) or x is None else repr(x) for x in row]
+        cells = ["" if (isinstance(x, float) and math.isnan(x)) or x is None else repr(x) for x in row]
         text.append("\t".join(cells))
     return hashlib.sha256("\n".join(sorted(text)).encode()).hexdigest()
 
@@ -124,7 +128,13 @@ def commit(path: str, rows: pd.DataFrame, metadata: dict[str, str]) -> tuple[int
                 return number, False
         except InputError:
             pass
-    properties = {**metadata, "digest": content, "program": f"ident {__version__}", "parent": parent, "vehicle": vehicle}
+    properties = {
+        **metadata,
+        "digest": content,
+        "program": f"ident {__version__}",
+        "parent": parent,
+        "vehicle": vehicle,
+    }
     try:
         write_deltalake(
             path,

@@ -135,8 +135,7 @@ def axes() -> dict[str, Axis]:
     with (files("sim") / "data" / "axes.csv").open(encoding="utf-8") as stream:
         rows = list(csv.DictReader(stream))
     return {
-        r["axis"]: Axis(r["axis"], r["column"], r["unit"], 1 if r["mirrors"] == "+" else -1, r["meaning"])
-        for r in rows
+        r["axis"]: Axis(r["axis"], r["column"], r["unit"], 1 if r["mirrors"] == "+" else -1, r["meaning"]) for r in rows
     }
 
 
@@ -211,10 +210,7 @@ def terms(term_set: str = "reduced") -> tuple[Term, ...]:
     for term in chosen:
         check(term)
     if term_set == "gertler_hagen":
-        chosen = [
-            t if t.group == "propulsion" else replace(t, axes=(), parity={}, extrapolation={})
-            for t in chosen
-        ]
+        chosen = [t if t.group == "propulsion" else replace(t, axes=(), parity={}, extrapolation={}) for t in chosen]
     return tuple(chosen)
 
 

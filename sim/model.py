@@ -1,0 +1,210 @@
+"""Assemble a vehicle and its coefficients into the flat arrays of the compiled kernel."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim import kernel
+from sim.catalogue import ACCELERATIONS, BOAT_FEATURES, OUTPUTS, PLANE_FEATURES, feature_index
+from sim.coefficients import Coefficient, Coefficients
+from sim.vehicle import Vehicle
+
+Array = NDArray[np.float64]
+_RULES = {"hold": kernel.HOLD, "linear": kernel.LINEAR, "linear_load": kernel.LINEAR_LOAD}
+MAX_FACTORS = 4
+
+
+@dataclass(frozen=True)
+class Environment:
+    """Water density [kg/m^3] and gravity [m/s^2]."""
+
+    density: float
+    gravity: float
+
+
+def cross_matrix(r: Iterable[float]) -> Array:
+    """The matrix [r]x with [r]x a = r x a."""
+    x, y, z = r
+    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+
+
+def rigid_body_matrix(vehicle: Vehicle) -> tuple[Array, Array]:
+    """Rigid-body mass matrix about the origin, Eq. (14) as corrected.
+
+    Returns
+    -------
+    mass : (6, 6) [kg, kg m, kg m^2].
+    inertia : (3, 3) inertia about the origin.
+    """
+    particulars = vehicle.particulars
+    m = particulars.mass.value
+    lever = cross_matrix(particulars.centre_of_gravity.value)
+    inertia = m * (np.diag(np.square(particulars.radius_of_gyration.value)) - lever @ lever)
+    return np.block([[m * np.eye(3), -m * lever], [m * lever, inertia]]), inertia
+
+
+def added_mass_matrix(coefficients: Coefficients, environment: Environment) -> Array:
+    """Added mass about the origin.
+
+    From sections, Eqs. (36)-(41): A = sum J^T diag(c m) J with J = [1, -[r]x]; or from the
+    whole-boat derivatives, as the vehicle declares.
+
+    Returns
+    -------
+    (6, 6) [kg, kg m, kg m^2]; zero when nothing was identified.
+    """
+    vehicle = coefficients.vehicle
+    length, diameter = vehicle.particulars.length.value, vehicle.propeller.diameter.value
+    total = np.zeros((6, 6))
+    centres = {s.name: s.position for s in vehicle.sections.centres} if vehicle.sections else {}
+    for coefficient in coefficients:
+        term = coefficient.term
+        if not term.is_acceleration:
+            continue
+        load = term.scale(environment.density, length, diameter) * float(coefficient.values[0])
+        i, j = OUTPUTS.index(term.output), ACCELERATIONS.index(term.factors[0])
+        if coefficient.part in centres:
+            motion = np.hstack([np.eye(3), -cross_matrix(centres[coefficient.part])])
+            total -= load * np.outer(motion[i], motion[j])
+        else:
+            total[i, j] -= load
+    return total
+
+
+def _refine(grid: Array, axis: int, old: Array, new: Array) -> Array:
+    """Values on a finer axis; exact for multilinear tables that hold beyond their ends."""
+    moved = np.moveaxis(grid, axis, -1)
+    if old.size == 1:
+        fine = np.repeat(moved, new.size, axis=-1)
+    else:
+        fine = np.apply_along_axis(lambda v: np.interp(new, old, v), -1, moved)
+    return np.moveaxis(fine, -1, axis)
+
+
+def _group_key(coefficient: Coefficient) -> tuple[object, ...]:
+    rules = tuple("hold" if r.startswith("drift") else r for r in coefficient.table.rules)
+    plane = coefficient.part if "delta" in coefficient.term.axes else ""
+    # A rule other than hold may not be refined, so its nodes must agree.
+    exact = tuple(n.tobytes() for n, r in zip(coefficient.table.nodes, rules, strict=True) if r != "hold")
+    return coefficient.term.axes, rules, plane, exact
+
+
+class _Flat:
+    """Lists that become the kernel's arrays."""
+
+    def __init__(self, coefficients: Coefficients, environment: Environment) -> None:
+        vehicle = coefficients.vehicle
+        self.planes = [p.name for p in vehicle.planes]
+        self.one = len(BOAT_FEATURES) + len(PLANE_FEATURES) * len(self.planes)
+        self.scale = (environment.density, vehicle.particulars.length.value, vehicle.propeller.diameter.value)
+        self.group: list[list[int]] = []
+        self.axis: list[list[int]] = []
+        self.nodes: list[float] = []
+        self.data: list[Array] = []
+        self.size = 0
+        self.coefficient: list[tuple[int, float, list[int]]] = []
+
+    def feature(self, factor: str, part: str) -> int:
+        return feature_index(factor, self.planes.index(part) if part in self.planes else -1)
+
+    def output(self, coefficient: Coefficient) -> int:
+        if coefficient.term.name == "t":
+            return kernel.OUT_DEDUCTION
+        return kernel.OUT_THRUST if coefficient.term.name == "KT" else OUTPUTS.index(coefficient.term.output)
+
+    def add_group(self, members: list[Coefficient]) -> None:
+        first = members[0]
+        rules = _group_key(first)[1]
+        union = [
+            np.unique(np.concatenate([m.table.extension[k][0] for m in members])) for k in range(len(first.term.axes))
+        ]
+        grids = []
+        for member in members:
+            grid = member.table.grid(member.values)
+            for k, nodes in enumerate(union):
+                grid = _refine(grid, k, member.table.extension[k][0], nodes)
+            grids.append(grid)
+        block = np.stack(grids, axis=-1)
+        start, kept = len(self.axis), 0
+        for k, (name, nodes) in enumerate(zip(first.term.axes, union, strict=True)):
+            if nodes.size == 1:
+                continue
+            stride = int(np.prod(block.shape[k + 1 :]))
+            rule = _RULES[rules[k]]  # type: ignore[index]
+            self.axis.append([self.feature(name, first.part), rule, len(self.nodes), nodes.size, stride])
+            self.nodes += list(nodes)
+            kept += 1
+        self.group.append([start, kept, len(self.coefficient), len(members), self.size])
+        self.data.append(block.reshape(-1))
+        self.size += block.size
+        for member in members:
+            factors = [self.feature(f, member.part) for f in member.term.factors]
+            factors += [self.one] * (MAX_FACTORS - len(factors))
+            scale = member.term.sign * member.term.scale(*self.scale)
+            self.coefficient.append((self.output(member), scale, factors))
+
+
+def _batches(members: list[Coefficient]) -> Iterable[list[Coefficient]]:
+    for i in range(0, len(members), kernel.MAX_COEFFICIENTS):
+        yield members[i : i + kernel.MAX_COEFFICIENTS]
+
+
+def assemble(coefficients: Coefficients, environment: Environment) -> kernel.Model:
+    """The compiled kernel's model of a vehicle.
+
+    Parameters
+    ----------
+    coefficients : From the database, with their vehicle.
+    environment : Water density and gravity.
+
+    Returns
+    -------
+    Model of flat arrays, program frame, SI and radians.
+    """
+    vehicle = coefficients.vehicle
+    groups: dict[tuple[object, ...], list[Coefficient]] = {}
+    for coefficient in coefficients:
+        if not coefficient.term.is_acceleration and coefficient.term.name != "w_T":
+            groups.setdefault(_group_key(coefficient), []).append(coefficient)
+    flat = _Flat(coefficients, environment)
+    for members in groups.values():
+        for batch in _batches(members):
+            flat.add_group(batch)
+    mass, inertia = rigid_body_matrix(vehicle)
+    wake = coefficients.get("w_T")
+    group = np.array(flat.group, dtype=np.int64).reshape(-1, 5)
+    axis = np.array(flat.axis, dtype=np.int64).reshape(-1, 5)
+    particulars = vehicle.particulars
+    return kernel.Model(
+        inverse_mass=np.linalg.inv(mass + added_mass_matrix(coefficients, environment)),
+        mass=particulars.mass.value,
+        inertia=inertia,
+        r_g=np.array(particulars.centre_of_gravity.value),
+        r_b=np.array(particulars.centre_of_buoyancy.value),
+        weight=particulars.mass.value * environment.gravity,
+        buoyancy=particulars.displaced_mass.value * environment.gravity,
+        sail_top=particulars.sail_top.value[2],
+        diameter=vehicle.propeller.diameter.value,
+        wake=float(wake.values[0]) if wake else 0.0,
+        position=np.array([p.position for p in vehicle.planes], dtype=float).reshape(-1, 3),
+        lift=np.array([p.lift_axis for p in vehicle.planes], dtype=float).reshape(-1, 3),
+        g_axis=group[:, 0].copy(),
+        g_axes=group[:, 1].copy(),
+        g_coefficient=group[:, 2].copy(),
+        g_coefficients=group[:, 3].copy(),
+        g_data=group[:, 4].copy(),
+        a_feature=axis[:, 0].copy(),
+        a_rule=axis[:, 1].copy(),
+        a_node=axis[:, 2].copy(),
+        a_nodes=axis[:, 3].copy(),
+        a_stride=axis[:, 4].copy(),
+        nodes=np.array(flat.nodes, dtype=float),
+        data=np.concatenate(flat.data) if flat.data else np.zeros(0),
+        k_output=np.array([k[0] for k in flat.coefficient], dtype=np.int64),
+        k_scale=np.array([k[1] for k in flat.coefficient], dtype=float),
+        k_factors=np.array([k[2] for k in flat.coefficient], dtype=np.int64).reshape(-1, MAX_FACTORS),
+    )
