@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -80,7 +81,7 @@ def digest(rows: pd.DataFrame) -> str:
     return hashlib.sha256("\n".join(sorted(text)).encode()).hexdigest()
 
 
-def _arrow(rows: pd.DataFrame) -> object:
+def _arrow(rows: pd.DataFrame) -> Any:
     import pyarrow as pa
 
     numbers = {*NUMBERS, *axis_columns()}
@@ -136,13 +137,19 @@ def commit(path: str, rows: pd.DataFrame, metadata: dict[str, str]) -> tuple[int
         "vehicle": vehicle,
     }
     try:
-        write_deltalake(
-            path,
-            _arrow(rows),
-            mode="overwrite" if exists else "error",
-            predicate=f"vehicle = '{vehicle}'" if exists else None,
-            commit_properties=CommitProperties(custom_metadata=properties),
-        )
+        if exists:
+            write_deltalake(
+                path,
+                _arrow(rows),
+                mode="overwrite",
+                schema_mode="merge",
+                predicate=f"vehicle = '{vehicle}'",
+                commit_properties=CommitProperties(custom_metadata=properties),
+            )
+        else:
+            write_deltalake(
+                path, _arrow(rows), mode="error", commit_properties=CommitProperties(custom_metadata=properties)
+            )
     except (CommitFailedError, DeltaError) as error:
         raise InputError(path, f"another fit wrote at the same time: {error}", "run the fit again") from error
     except OSError as error:

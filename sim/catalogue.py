@@ -18,7 +18,7 @@ from importlib.resources import files
 
 OUTPUTS = ("X", "Y", "Z", "K", "M", "N")
 SETS = ("reduced", "gertler_hagen")
-RULES = ("hold", "linear", "linear_load", "drift_odd", "drift_even")
+RULES = ("hold", "linear", "linear_load", "drift_odd", "drift_even", "absent")
 
 # Sign of each output and state factor under the port/starboard mirror.
 MIRROR_OUTPUT = {"X": 1, "Y": -1, "Z": 1, "K": -1, "M": 1, "N": -1}

@@ -115,7 +115,8 @@ def read_rows(path: str, version: int | None = None, vehicle: str | None = None)
         When database, version or vehicle do not exist.
     """
     table = open_table(path, version)
-    rows = table.to_pyarrow_table().to_pandas()
+    # A version written before an axis existed has no column for it.
+    rows = table.to_pyarrow_table().to_pandas().reindex(columns=column_order())
     if vehicle is not None:
         known = sorted(rows["vehicle"].unique())
         rows = rows[rows["vehicle"] == vehicle]

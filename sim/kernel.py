@@ -21,42 +21,41 @@ HOLD, LINEAR, LINEAR_LOAD = 0, 1, 2
 N_BOAT, N_PLANE = len(BOAT_FEATURES), len(PLANE_FEATURES)
 OUT_DEDUCTION, OUT_THRUST, N_OUT = 6, 7, 8
 MAX_COEFFICIENTS = 16
+MAX_CORNERS = 32
+MAX_AXES = 128
 
 
 class Model(NamedTuple):
-    """A vehicle with its coefficients as flat arrays.
+    """A vehicle with its coefficients as a few flat arrays, cheap to hand to a function.
 
-    Groups are tables that share axes: ``g_*`` per group, ``a_*`` per axis of a group,
-    ``k_*`` per coefficient; ``data`` holds the grids, coefficients innermost.
+    inverse_mass : (6, 6) inverse of rigid-body plus added mass.
+    mass, weight, buoyancy [kg, N, N]; r_g, r_b [m]; inertia : Ixx Iyy Izz Ixy Ixz Iyz.
+    sail_top : D0 = z + sail_top [m]; diameter [m]; wake : w_T.
+    planes : (planes, 6) position [m] and lift axis of each plane.
+    groups : (g, 5) tables that share axes: first link, links, first coefficient,
+        coefficients, first value in ``data`` (coefficients innermost).
+    links : (l, 2) axis and stride; axes : (a, 4) feature, rule, first node, nodes.
+    terms : (k, 5) output and four factors of each coefficient; scale : (k,) its load scale.
     """
 
     inverse_mass: np.ndarray
     mass: float
-    inertia: np.ndarray
-    r_g: np.ndarray
-    r_b: np.ndarray
     weight: float
     buoyancy: float
+    r_g: tuple[float, float, float]
+    r_b: tuple[float, float, float]
+    inertia: tuple[float, float, float, float, float, float]
     sail_top: float
     diameter: float
     wake: float
-    position: np.ndarray
-    lift: np.ndarray
-    g_axis: np.ndarray
-    g_axes: np.ndarray
-    g_coefficient: np.ndarray
-    g_coefficients: np.ndarray
-    g_data: np.ndarray
-    a_feature: np.ndarray
-    a_rule: np.ndarray
-    a_node: np.ndarray
-    a_nodes: np.ndarray
-    a_stride: np.ndarray
+    planes: np.ndarray
+    groups: np.ndarray
+    links: np.ndarray
+    axes: np.ndarray
     nodes: np.ndarray
     data: np.ndarray
-    k_output: np.ndarray
-    k_scale: np.ndarray
-    k_factors: np.ndarray
+    terms: np.ndarray
+    scale: np.ndarray
 
 
 class Work(NamedTuple):
@@ -65,10 +64,10 @@ class Work(NamedTuple):
     features: np.ndarray
     values: np.ndarray
     loads: np.ndarray
-    offset: np.ndarray
-    stride: np.ndarray
+    place: np.ndarray
+    weight: np.ndarray
+    lower: np.ndarray
     fraction: np.ndarray
-    force: np.ndarray
 
 
 def workspace(n_planes: int) -> Work:
@@ -77,10 +76,10 @@ def workspace(n_planes: int) -> Work:
         np.ones(N_BOAT + N_PLANE * n_planes + 1),
         np.zeros(MAX_COEFFICIENTS),
         np.zeros(N_OUT),
-        np.zeros(8, dtype=np.int64),
-        np.zeros(8, dtype=np.int64),
-        np.zeros(8),
-        np.zeros(6),
+        np.zeros(MAX_CORNERS, dtype=np.int64),
+        np.zeros(MAX_CORNERS),
+        np.zeros(MAX_AXES, dtype=np.int64),
+        np.zeros(MAX_AXES),
     )
 
 
@@ -89,11 +88,11 @@ def _sign(x):
     return 1.0 if x > 0.0 else (-1.0 if x < 0.0 else 0.0)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", inline="always")
 def fill_features(m, y, c, f):
     """State features in the order of the catalogue, then three per plane, then 1."""
     u, v, w, p, q, r = y[0], y[1], y[2], y[3], y[4], y[5]
-    n_planes = m.position.shape[0]
+    n_planes = m.planes.shape[0]
     for i in range(6):
         f[i] = y[i]
         f[6 + i] = abs(y[i])
@@ -112,14 +111,14 @@ def fill_features(m, y, c, f):
     f[28], f[29], f[30] = w * p, w * q, w * r
     f[31], f[32], f[33] = p * q, q * r, r * p
     for i in range(n_planes):
-        x, yy, z = m.position[i, 0], m.position[i, 1], m.position[i, 2]
+        x, yy, z = m.planes[i, 0], m.planes[i, 1], m.planes[i, 2]
         a = u + q * z - r * yy
         b = v + r * x - p * z
         d = w + p * yy - q * x
         size = sqrt(a * a + b * b + d * d)
         incidence = 0.0
         if size > 0.0:
-            incidence = asin(-(a * m.lift[i, 0] + b * m.lift[i, 1] + d * m.lift[i, 2]) / size)
+            incidence = asin(-(a * m.planes[i, 3] + b * m.planes[i, 4] + d * m.planes[i, 5]) / size)
         k = N_BOAT + N_PLANE * i
         f[k], f[k + 1], f[k + 2] = size, c[i] + incidence, c[i]
 
@@ -138,43 +137,44 @@ def _locate(nodes, start, count, rule, x):
     return i, 0.0 if x < a else 1.0
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", inline="always")
 def loads(m, work):
     """Hydrodynamic loads X Y Z K M N from the features in ``work``; into ``work.loads``."""
     f, values, out = work.features, work.values, work.loads
-    offset, stride, fraction = work.offset, work.stride, work.fraction
+    place, weight = work.place, work.weight
     for j in range(N_OUT):
         out[j] = 0.0
-    for g in range(m.g_axis.size):
-        axes, first = m.g_axes[g], m.g_coefficient[g]
-        count, base = m.g_coefficients[g], m.g_data[g]
-        used = 0
-        for k in range(axes):
-            a = m.g_axis[g] + k
-            i, t = _locate(m.nodes, m.a_node[a], m.a_nodes[a], m.a_rule[a], f[m.a_feature[a]])
-            base += i * m.a_stride[a]
-            if t == 1.0:
-                base += m.a_stride[a]
-            elif t != 0.0:
-                stride[used], fraction[used] = m.a_stride[a], t
-                used += 1
+    for a in range(m.axes.shape[0]):
+        x = f[m.axes[a, 0]]
+        work.lower[a], work.fraction[a] = _locate(m.nodes, m.axes[a, 2], m.axes[a, 3], m.axes[a, 1], x)
+    for g in range(m.groups.shape[0]):
+        first, count = m.groups[g, 2], m.groups[g, 3]
+        place[0], weight[0], corners = m.groups[g, 4], 1.0, 1
+        for link in range(m.groups[g, 0], m.groups[g, 0] + m.groups[g, 1]):
+            axis, step = m.links[link, 0], m.links[link, 1]
+            t, shift = work.fraction[axis], work.lower[axis] * step
+            if t == 0.0 or t == 1.0:
+                # On a node or held: no second corner along this axis.
+                shift += step if t == 1.0 else 0
+                for k in range(corners):
+                    place[k] += shift
+                continue
+            for k in range(corners):
+                place[k] += shift
+                place[corners + k] = place[k] + step
+                weight[corners + k] = weight[k] * t
+                weight[k] *= 1.0 - t
+            corners *= 2
         for j in range(count):
             values[j] = 0.0
-        for corner in range(1 << used):
-            weight, place = 1.0, base
-            for k in range(used):
-                if (corner >> k) & 1:
-                    weight *= fraction[k]
-                    place += stride[k]
-                else:
-                    weight *= 1.0 - fraction[k]
+        for k in range(corners):
+            share, at = weight[k], place[k]
             for j in range(count):
-                values[j] += weight * m.data[place + j]
+                values[j] += share * m.data[at + j]
         for j in range(count):
             k = first + j
-            m0, m1 = f[m.k_factors[k, 0]], f[m.k_factors[k, 1]]
-            m2, m3 = f[m.k_factors[k, 2]], f[m.k_factors[k, 3]]
-            out[m.k_output[k]] += m.k_scale[k] * values[j] * m0 * m1 * m2 * m3
+            product = m.scale[k] * values[j] * f[m.terms[k, 1]] * f[m.terms[k, 2]]
+            out[m.terms[k, 0]] += product * f[m.terms[k, 3]] * f[m.terms[k, 4]]
     out[0] += (1.0 - out[OUT_DEDUCTION]) * out[OUT_THRUST]
 
 
@@ -196,29 +196,32 @@ def rhs(m, y, c, work, dy):
     phi, theta, psi = y[9], y[10], y[11]
     sf, cf, st, ct, sp, cp = sin(phi), cos(phi), sin(theta), cos(theta), sin(psi), cos(psi)
     gx, gy, gz = -st, ct * sf, ct * cf
-    xg, yg, zg = m.r_g[0], m.r_g[1], m.r_g[2]
-    xb, yb, zb = m.r_b[0], m.r_b[1], m.r_b[2]
+    xg, yg, zg = m.r_g
+    xb, yb, zb = m.r_b
     net = m.weight - m.buoyancy
     mx, my, mz = xg * m.weight - xb * m.buoyancy, yg * m.weight - yb * m.buoyancy, zg * m.weight - zb * m.buoyancy
     # omega x v, omega x (omega x r_G), omega x (I omega)
     cx, cy, cz = q * w - r * v, r * u - p * w, p * v - q * u
     ax, ay, az = q * zg - r * yg, r * xg - p * zg, p * yg - q * xg
     ex, ey, ez = q * az - r * ay, r * ax - p * az, p * ay - q * ax
-    hx = m.inertia[0, 0] * p + m.inertia[0, 1] * q + m.inertia[0, 2] * r
-    hy = m.inertia[1, 0] * p + m.inertia[1, 1] * q + m.inertia[1, 2] * r
-    hz = m.inertia[2, 0] * p + m.inertia[2, 1] * q + m.inertia[2, 2] * r
-    force = work.force
-    force[0] = work.loads[0] + net * gx - m.mass * (cx + ex)
-    force[1] = work.loads[1] + net * gy - m.mass * (cy + ey)
-    force[2] = work.loads[2] + net * gz - m.mass * (cz + ez)
-    force[3] = work.loads[3] + my * gz - mz * gy - (q * hz - r * hy) - m.mass * (yg * cz - zg * cy)
-    force[4] = work.loads[4] + mz * gx - mx * gz - (r * hx - p * hz) - m.mass * (zg * cx - xg * cz)
-    force[5] = work.loads[5] + mx * gy - my * gx - (p * hy - q * hx) - m.mass * (xg * cy - yg * cx)
+    ixx, iyy, izz, ixy, ixz, iyz = m.inertia
+    hx, hy, hz = ixx * p + ixy * q + ixz * r, ixy * p + iyy * q + iyz * r, ixz * p + iyz * q + izz * r
+    f0 = work.loads[0] + net * gx - m.mass * (cx + ex)
+    f1 = work.loads[1] + net * gy - m.mass * (cy + ey)
+    f2 = work.loads[2] + net * gz - m.mass * (cz + ez)
+    f3 = work.loads[3] + my * gz - mz * gy - (q * hz - r * hy) - m.mass * (yg * cz - zg * cy)
+    f4 = work.loads[4] + mz * gx - mx * gz - (r * hx - p * hz) - m.mass * (zg * cx - xg * cz)
+    f5 = work.loads[5] + mx * gy - my * gx - (p * hy - q * hx) - m.mass * (xg * cy - yg * cx)
+    inverse = m.inverse_mass
     for i in range(6):
-        total = 0.0
-        for j in range(6):
-            total += m.inverse_mass[i, j] * force[j]
-        dy[i] = total
+        dy[i] = (
+            inverse[i, 0] * f0
+            + inverse[i, 1] * f1
+            + inverse[i, 2] * f2
+            + inverse[i, 3] * f3
+            + inverse[i, 4] * f4
+            + inverse[i, 5] * f5
+        )
     dy[6] = ct * cp * u + (sf * st * cp - cf * sp) * v + (cf * st * cp + sf * sp) * w
     dy[7] = ct * sp * u + (sf * st * sp + cf * cp) * v + (cf * st * sp - sf * cp) * w
     dy[8] = -st * u + sf * ct * v + cf * ct * w

@@ -86,11 +86,17 @@ def _refine(grid: Array, axis: int, old: Array, new: Array) -> Array:
 
 
 def _group_key(coefficient: Coefficient) -> tuple[object, ...]:
-    rules = tuple("hold" if r.startswith("drift") else r for r in coefficient.table.rules)
+    # Continuation nodes stand in the grid already, so the kernel holds beyond them.
+    rules = tuple(r if r in _RULES else "hold" for r in coefficient.table.rules)
     plane = coefficient.part if "delta" in coefficient.term.axes else ""
     # A rule other than hold may not be refined, so its nodes must agree.
     exact = tuple(n.tobytes() for n, r in zip(coefficient.table.nodes, rules, strict=True) if r != "hold")
     return coefficient.term.axes, rules, plane, exact
+
+
+def _triple(values: list[float]) -> tuple[float, float, float]:
+    x, y, z = (float(v) for v in values)
+    return x, y, z
 
 
 class _Flat:
@@ -102,7 +108,9 @@ class _Flat:
         self.one = len(BOAT_FEATURES) + len(PLANE_FEATURES) * len(self.planes)
         self.scale = (environment.density, vehicle.particulars.length.value, vehicle.propeller.diameter.value)
         self.group: list[list[int]] = []
-        self.axis: list[list[int]] = []
+        self.link: list[list[int]] = []
+        self.axis: dict[tuple[int, int, bytes], list[int]] = {}
+        self.order: dict[tuple[int, int, bytes], int] = {}
         self.nodes: list[float] = []
         self.data: list[Array] = []
         self.size = 0
@@ -115,6 +123,15 @@ class _Flat:
         if coefficient.term.name == "t":
             return kernel.OUT_DEDUCTION
         return kernel.OUT_THRUST if coefficient.term.name == "KT" else OUTPUTS.index(coefficient.term.output)
+
+    def axis_index(self, feature: int, rule: int, nodes: Array) -> int:
+        """Axes with the same feature, rule and nodes are located once per evaluation."""
+        key = (feature, rule, nodes.tobytes())
+        if key not in self.order:
+            self.order[key] = len(self.order)
+            self.axis[key] = [feature, rule, len(self.nodes), nodes.size]
+            self.nodes += list(nodes)
+        return self.order[key]
 
     def add_group(self, members: list[Coefficient]) -> None:
         first = members[0]
@@ -129,16 +146,13 @@ class _Flat:
                 grid = _refine(grid, k, member.table.extension[k][0], nodes)
             grids.append(grid)
         block = np.stack(grids, axis=-1)
-        start, kept = len(self.axis), 0
+        start = len(self.link)
         for k, (name, nodes) in enumerate(zip(first.term.axes, union, strict=True)):
-            if nodes.size == 1:
-                continue
-            stride = int(np.prod(block.shape[k + 1 :]))
-            rule = _RULES[rules[k]]  # type: ignore[index]
-            self.axis.append([self.feature(name, first.part), rule, len(self.nodes), nodes.size, stride])
-            self.nodes += list(nodes)
-            kept += 1
-        self.group.append([start, kept, len(self.coefficient), len(members), self.size])
+            if nodes.size > 1:
+                feature, rule = self.feature(name, first.part), _RULES[rules[k]]  # type: ignore[index]
+                stride = int(np.prod(block.shape[k + 1 :]))
+                self.link.append([self.axis_index(feature, rule, nodes), stride])
+        self.group.append([start, len(self.link) - start, len(self.coefficient), len(members), self.size])
         self.data.append(block.reshape(-1))
         self.size += block.size
         for member in members:
@@ -176,35 +190,27 @@ def assemble(coefficients: Coefficients, environment: Environment) -> kernel.Mod
             flat.add_group(batch)
     mass, inertia = rigid_body_matrix(vehicle)
     wake = coefficients.get("w_T")
-    group = np.array(flat.group, dtype=np.int64).reshape(-1, 5)
-    axis = np.array(flat.axis, dtype=np.int64).reshape(-1, 5)
     particulars = vehicle.particulars
+    if len(flat.axis) > kernel.MAX_AXES:
+        raise ValueError(f"{vehicle.name}: {len(flat.axis)} table axes, at most {kernel.MAX_AXES}")
+    planes = [[*p.position, *p.lift_axis] for p in vehicle.planes]
     return kernel.Model(
         inverse_mass=np.linalg.inv(mass + added_mass_matrix(coefficients, environment)),
         mass=particulars.mass.value,
-        inertia=inertia,
-        r_g=np.array(particulars.centre_of_gravity.value),
-        r_b=np.array(particulars.centre_of_buoyancy.value),
         weight=particulars.mass.value * environment.gravity,
         buoyancy=particulars.displaced_mass.value * environment.gravity,
+        r_g=_triple(particulars.centre_of_gravity.value),
+        r_b=_triple(particulars.centre_of_buoyancy.value),
+        inertia=tuple(float(inertia[i, j]) for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))),  # type: ignore[arg-type]
         sail_top=particulars.sail_top.value[2],
         diameter=vehicle.propeller.diameter.value,
         wake=float(wake.values[0]) if wake else 0.0,
-        position=np.array([p.position for p in vehicle.planes], dtype=float).reshape(-1, 3),
-        lift=np.array([p.lift_axis for p in vehicle.planes], dtype=float).reshape(-1, 3),
-        g_axis=group[:, 0].copy(),
-        g_axes=group[:, 1].copy(),
-        g_coefficient=group[:, 2].copy(),
-        g_coefficients=group[:, 3].copy(),
-        g_data=group[:, 4].copy(),
-        a_feature=axis[:, 0].copy(),
-        a_rule=axis[:, 1].copy(),
-        a_node=axis[:, 2].copy(),
-        a_nodes=axis[:, 3].copy(),
-        a_stride=axis[:, 4].copy(),
+        planes=np.array(planes, dtype=float).reshape(-1, 6),
+        groups=np.array(flat.group, dtype=np.int64).reshape(-1, 5),
+        links=np.array(flat.link, dtype=np.int64).reshape(-1, 2),
+        axes=np.array(list(flat.axis.values()), dtype=np.int64).reshape(-1, 4),
         nodes=np.array(flat.nodes, dtype=float),
         data=np.concatenate(flat.data) if flat.data else np.zeros(0),
-        k_output=np.array([k[0] for k in flat.coefficient], dtype=np.int64),
-        k_scale=np.array([k[1] for k in flat.coefficient], dtype=float),
-        k_factors=np.array([k[2] for k in flat.coefficient], dtype=np.int64).reshape(-1, MAX_FACTORS),
+        terms=np.array([[k[0], *k[2]] for k in flat.coefficient], dtype=np.int64).reshape(-1, 1 + MAX_FACTORS),
+        scale=np.array([k[1] for k in flat.coefficient], dtype=float),
     )

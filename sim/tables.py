@@ -12,7 +12,7 @@ standard error follows from the same weights.
   ``linear_load`` (coefficient times axis goes on straight, so the coefficient tends to a
   constant); ``drift_odd`` and ``drift_even``: Eq. (25) matched in value and slope at the
   last run, C0 cos^2 + A sin cos + B sin|sin| for in-plane loads, A cos^2 + B sin^2 for
-  out-of-plane loads, up to 90 deg.
+  out-of-plane loads, up to 90 deg; ``absent`` (for a sign axis): zero on a side no run has.
 """
 
 from __future__ import annotations
@@ -88,14 +88,17 @@ def extend_axis(nodes: Array, rule: str) -> tuple[Array, Array]:
 
     Parameters
     ----------
-    nodes : (n,) increasing angles [rad].
-    rule : ``drift_odd``, ``drift_even``, or another rule (nothing is added).
+    nodes : (n,) increasing angles [rad], or signs.
+    rule : ``drift_odd``, ``drift_even``, ``absent``, or another rule (nothing is added).
 
     Returns
     -------
     extended : (m,) axis values, m >= n.
     matrix : (m, n) values at ``extended`` from values at ``nodes``.
     """
+    if rule == "absent":
+        sides = np.array([-1.0, 0.0, 1.0])
+        return sides, (sides[:, None] == nodes[None, :]).astype(float)
     if not rule.startswith("drift") or nodes.size < 3 or nodes[-1] >= _FINE_TO:
         return nodes, np.eye(nodes.size)
     extra: list[float] = []
@@ -242,7 +245,8 @@ class Table:
         if not self.axes:
             return 1.0
         weights = np.abs(self.grid_weights(x))
-        return float(weights[self.measured].sum() / weights.sum())
+        total = weights.sum()
+        return float(weights[self.measured].sum() / total) if total else 0.0
 
     def grid(self, values: Array) -> Array:
         """Values on the extended grid.

@@ -1,0 +1,228 @@
+"""The command line. Imports are inside the commands, so that --help is quick."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+import click
+
+from ident import __version__
+
+DB = click.option("--db", default="coeff_db", show_default=True, help="Database folder or object-store URL.")
+VERSION = click.option("--version", "version", type=int, default=None, help="Database version; latest by default.")
+
+
+class Commands(click.Group):
+    """Turns a user's mistake into one message and exit code 2."""
+
+    def invoke(self, ctx: click.Context) -> Any:
+        """Run a command; ``InputError`` becomes a message."""
+        from sim.errors import InputError
+
+        try:
+            return super().invoke(ctx)
+        except InputError as error:
+            click.secho(f"Error: {error.where}", fg="red", err=True)
+            click.echo(f"  found:   {error.found}", err=True)
+            click.echo(f"  allowed: {error.allowed}", err=True)
+            ctx.exit(2)
+        except BrokenPipeError:
+            ctx.exit(1)
+
+
+def _emit(data: Any, target: str) -> None:
+    """Write JSON to a file or, for ``-``, to standard output."""
+    text = json.dumps(data, indent=2, allow_nan=False)
+    if target == "-":
+        click.echo(text)
+        return
+    path = Path(target)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text + "\n", encoding="utf-8")
+    except OSError as error:
+        from sim.errors import InputError
+
+        raise InputError(target, f"cannot be written: {error.strerror}", "a path you may write to, or -") from error
+
+
+def _console(quiet: bool = False) -> Any:
+    from rich.console import Console
+
+    # A pipe has no width of its own; tables are cut less when it is generous.
+    return Console(quiet=quiet, width=None if sys.stdout.isatty() else 140)
+
+
+@click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(__version__, prog_name="ident")
+def main() -> None:
+    """Captive submarine tests to a maneuvering model people trust.
+
+    \b
+    ident fit raw_captive_data/      identify coefficients, commit a version
+    ident report                     one HTML page on a version
+    ident validate --case hzz20      fly a maneuver and compare
+    """
+
+
+@main.command()
+@click.argument("folder", type=click.Path(path_type=Path))
+@DB
+@click.option("-m", "--message", default="", help="Message stored with the version.")
+@click.option("--json", "json_path", default=None, metavar="PATH|-", help="Write the summary as JSON.")
+def fit(folder: Path, db: str, message: str, json_path: str | None) -> None:
+    """Identify the coefficients of a campaign and commit one database version.
+
+    FOLDER holds campaign.toml and one CSV a test, or such folders.
+
+    \b
+    Example: ident fit raw_captive_data/ --db coeff_db
+    """
+    from ident.fit import fit as run
+    from ident.fit import show
+
+    console = _console(quiet=json_path == "-")
+    with console.status("reading and identifying"):
+        done = run(folder, db, message)
+    for one in done:
+        show(one, console)
+    if json_path:
+        _emit([one.summary() for one in done], json_path)
+
+
+@main.command()
+@click.option("--case", "case", required=True, help="Bundled case name, or path to a case file.")
+@DB
+@VERSION
+@click.option("--out", type=click.Path(path_type=Path), default=Path("reports"), show_default=True, help="Figures go here.")
+@click.option("--json", "json_path", default=None, metavar="PATH|-", help="Write the comparison as JSON.")
+@click.option("--strict", is_flag=True, help="Exit 1 when a tolerance of the case file is missed.")
+def validate(case: str, db: str, version: int | None, out: Path, json_path: str | None, strict: bool) -> None:
+    """Fly a maneuver from the database and compare it with its references.
+
+    \b
+    Example: ident validate --case hzz20 --json -
+    """
+    from ident.figures import case_figure
+    from ident.validate import show
+    from ident.validate import validate as run
+    from sim.errors import InputError
+    from sim.trim import NoEquilibrium
+
+    console = _console(quiet=json_path == "-")
+    try:
+        with console.status("flying the case (the first run on a machine compiles for half a minute)"):
+            done = run(case, db, version)
+    except NoEquilibrium as error:
+        raise InputError(f"case {case}", str(error), "a state the boat can hold") from error
+    show(done, console)
+    if out.exists() and not out.is_dir():
+        raise InputError(str(out), "a file", "a folder for the figures")
+    figure = case_figure(done, out / f"{done.case.name}_v{done.result['database']['version']}.png")
+    console.print(f"figure: {figure}", highlight=False)
+    if json_path:
+        _emit(done.result, json_path)
+    if strict and not done.result["passed"]:
+        raise click.exceptions.Exit(1)
+
+
+@main.command()
+@DB
+@VERSION
+@click.option("--vehicle", default="bb2", show_default=True, help="Bundled vehicle name, or path to a vehicle file.")
+@click.option("--out", type=click.Path(path_type=Path), default=Path("reports"), show_default=True, help="Folder for the page.")
+def report(db: str, version: int | None, vehicle: str, out: Path) -> None:
+    """Write one self-contained HTML page on a database version.
+
+    \b
+    Example: ident report --version 0
+    """
+    from ident.report import write_report
+
+    console = _console()
+    with console.status("drawing every coefficient"):
+        path = write_report(db, version, out, vehicle)
+    console.print(f"report: {path}", highlight=False)
+
+
+@main.command()
+@DB
+@click.option("--json", "json_path", default=None, metavar="PATH|-", help="Write the list as JSON.")
+def versions(db: str, json_path: str | None) -> None:
+    """List the versions of a database.
+
+    \b
+    Example: ident versions --db coeff_db
+    """
+    from datetime import UTC, datetime
+
+    from rich.table import Table
+
+    from sim.database import versions as read
+
+    keys = ("vehicle", "campaign", "digest", "parent", "program", "message")
+    found = [
+        {
+            "version": v.number,
+            "time": datetime.fromtimestamp(int(v.timestamp) / 1000, UTC).isoformat(timespec="seconds"),
+            **{k: v.metadata.get(k, "") for k in keys},
+        }
+        for v in read(db)
+    ]
+    if json_path:
+        _emit(found, json_path)
+    if json_path != "-":
+        table = Table(*found[0])
+        for row in found:
+            table.add_row(*[str(x)[:16] if k == "digest" else str(x) for k, x in row.items()])
+        _console().print(table)
+
+
+@main.command()
+@click.argument("first", type=int)
+@click.argument("second", type=int)
+@DB
+@click.option("--json", "json_path", default=None, metavar="PATH|-", help="Write the differences as JSON.")
+def diff(first: int, second: int, db: str, json_path: str | None) -> None:
+    """Show what changed between two versions.
+
+    \b
+    Example: ident diff 0 1
+    """
+    from rich.table import Table
+
+    from ident.compare import difference
+
+    found = difference(db, first, second)
+    if json_path:
+        _emit(found, json_path)
+    if json_path == "-":
+        return
+    if not found:
+        click.echo(f"versions {first} and {second} hold the same coefficients")
+        return
+    table = Table("coefficient", "added", "removed", "changed", "largest change", "in standard errors")
+    for row in found:
+        change = f"{100 * row['largest_relative_change']:.3g} %"
+        counts = [str(row[k]) for k in ("added", "removed", "changed")]
+        table.add_row(row["coefficient"], *counts, change, f"{row['largest_change_in_stderr']:.2f}")
+    _console().print(table)
+
+
+@main.command()
+@click.argument("folder", type=click.Path(path_type=Path))
+@click.option("--format", "kind", type=click.Choice(["parquet", "csv", "json"]), default="csv", show_default=True)
+@DB
+@VERSION
+def export(folder: Path, kind: str, db: str, version: int | None) -> None:
+    """Write one version as a plain file into FOLDER.
+
+    \b
+    Example: ident export --version 0 --format csv exported/
+    """
+    from ident.compare import export as run
+
+    click.echo(str(run(db, version, kind, folder)))

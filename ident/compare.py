@@ -1,0 +1,97 @@
+"""Differences between database versions, and export."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from sim.database import axis_columns, read_rows
+from sim.errors import InputError
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+FORMATS = ("parquet", "csv", "json")
+
+
+def _indexed(rows: pd.DataFrame) -> pd.DataFrame:
+    keys = ["vehicle", "coefficient", "part", *axis_columns()]
+    return rows.set_index(keys)[["value", "stderr"]]
+
+
+def difference(db: str, first: int, second: int) -> list[dict[str, Any]]:
+    """What changed between two versions, one row a coefficient.
+
+    Parameters
+    ----------
+    db : Database path or URL.
+    first, second : Version numbers.
+
+    Returns
+    -------
+    For each coefficient that differs: points added, removed and changed, the largest
+    change relative to the coefficient's largest value, and in standard errors.
+
+    Raises
+    ------
+    InputError
+        When the database or a version does not exist.
+    """
+    old, new = (_indexed(read_rows(db, v)[0]) for v in (first, second))
+    both = old.join(new, how="outer", lsuffix="_old", rsuffix="_new")
+    found = []
+    for (vehicle, name), group in both.groupby(level=["vehicle", "coefficient"], sort=False):
+        added, removed = group["value_old"].isna(), group["value_new"].isna()
+        step = (group["value_new"] - group["value_old"]).abs()
+        changed = step > 0
+        if not (added | removed | changed).any():
+            continue
+        error = group[["stderr_old", "stderr_new"]].max(axis=1)
+        score = (step / error)[changed & (error > 0)]
+        scale = group["value_old"].abs().max()
+        found.append(
+            {
+                "vehicle": str(vehicle),
+                "coefficient": str(name),
+                "added": int(added.sum()),
+                "removed": int(removed.sum()),
+                "changed": int(changed.sum()),
+                "largest_relative_change": float(step.max() / scale) if changed.any() and scale > 0 else 0.0,
+                "largest_change_in_stderr": float(score.max()) if not score.empty else 0.0,
+            }
+        )
+    return found
+
+
+def export(db: str, version: int | None, kind: str, folder: Path) -> Path:
+    """Write one version as a plain file.
+
+    Parameters
+    ----------
+    db, version : Database and version (latest when None).
+    kind : ``parquet``, ``csv`` or ``json``.
+    folder : Where the file goes; created when absent.
+
+    Returns
+    -------
+    The file, ``coefficients_v<version>.<kind>``.
+
+    Raises
+    ------
+    InputError
+        For a missing database or version, or a folder that is a file.
+    """
+    rows, number = read_rows(db, version)
+    if folder.exists() and not folder.is_dir():
+        raise InputError(str(folder), "a file", "a folder for the export")
+    folder.mkdir(parents=True, exist_ok=True)
+    path = folder / f"coefficients_v{number}.{kind}"
+    part = path.with_suffix(".part")
+    if kind == "parquet":
+        rows.to_parquet(part, index=False)
+    elif kind == "csv":
+        rows.to_csv(part, index=False)
+    else:
+        rows.to_json(part, orient="records", indent=1, double_precision=15)
+    part.replace(path)
+    return path

@@ -1,0 +1,189 @@
+"""`ident fit`: read a campaign, identify, commit one version, say what was done."""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ident.campaign import Campaign, find_campaigns, read_campaign
+from ident.identify import Identification, identify
+from ident.store import commit, database_rows, digest
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from rich.console import Console
+
+SECTIONS = "sectional added mass"
+
+
+@dataclass(frozen=True)
+class Fit:
+    """One fitted campaign.
+
+    Attributes
+    ----------
+    campaign, found : What was read and identified.
+    rows : The database rows.
+    version : Version that holds them.
+    new : False when the latest version held them already.
+    digest : Content digest.
+    """
+
+    campaign: Campaign
+    found: Identification
+    rows: pd.DataFrame
+    version: int
+    new: bool
+    digest: str
+
+    def summary(self) -> dict[str, Any]:
+        """What a machine wants to know of the fit."""
+        return {
+            "campaign": self.campaign.header.name,
+            "vehicle": self.campaign.vehicle.name,
+            "version": self.version,
+            "new": self.new,
+            "digest": self.digest,
+            "runs": len(self.campaign.runs),
+            "coefficients": coefficient_table(self.rows),
+            "unused": [dict(zip(("run_id", "file", "row", "output", "reason"), u, strict=True)) for u in self.found.unused],
+            "warnings": [{"subject": s, "message": m} for s, m in self.found.warnings],
+        }
+
+
+def metadata(campaign: Campaign, found: Identification, message: str) -> dict[str, str]:
+    """What a commit carries beside its rows: provenance, inputs, notes of the fit."""
+    header = campaign.header
+    return {
+        "campaign": header.name,
+        "facility": header.facility,
+        "provenance": header.provenance.strip(),
+        "frame": f"x {header.frame.x}, y {header.frame.y}, z {header.frame.z}",
+        "inputs": json.dumps(campaign.digests),
+        "options": json.dumps({"uncertainty": header.uncertainty.model_dump()}),
+        "unused": json.dumps(found.unused),
+        "warnings": json.dumps(found.warnings),
+        "quality": json.dumps({k: q.model_dump() for k, q in header.quality.items()}),
+        "message": message,
+    }
+
+
+def fit(folder: Path, db: str, message: str = "") -> list[Fit]:
+    """Fit every campaign at or below ``folder`` into the database.
+
+    Parameters
+    ----------
+    folder : Campaign folder, or a folder of campaign folders.
+    db : Database path or URL.
+    message : Stored with the version.
+
+    Returns
+    -------
+    One Fit a campaign, in folder order.
+
+    Raises
+    ------
+    sim.errors.InputError
+        For bad input; nothing is committed for the campaign that has it.
+    """
+    read = [read_campaign(path) for path in find_campaigns(folder)]
+    done = []
+    for campaign in read:
+        found = identify(campaign)
+        rows = database_rows(found)
+        version, new = commit(db, rows, metadata(campaign, found, message))
+        done.append(Fit(campaign, found, rows, version, new, digest(rows)))
+    return done
+
+
+def coefficient_table(rows: pd.DataFrame) -> list[dict[str, Any]]:
+    """One row a coefficient: points, runs, worst disagreement, points by quality."""
+    table = []
+    for name, group in rows.groupby("coefficient", sort=False):
+        own = group[group["origin"] == "measured"]
+        counted = own if not own.empty else group
+        table.append(
+            {
+                "coefficient": str(name),
+                "points": len(group),
+                "measured": len(own),
+                "runs": len({r for text in group["runs"] for r in text.split()}),
+                "median_relative_error": float((counted["stderr"] / counted["value"].abs()).median()),
+                "worst_residual": float(group["worst_residual"].max()),
+                "quality": dict(Counter(q for q in counted["quality"] if q)),
+            }
+        )
+    return table
+
+
+def _reasons(done: Fit) -> dict[tuple[str, str, str], list[str]]:
+    grouped: dict[tuple[str, str, str], list[str]] = {}
+    for run_id, file, _, output, reason in done.found.unused:
+        grouped.setdefault((file, output, reason), []).append(run_id)
+    return grouped
+
+
+def _warnings(done: Fit) -> Counter[str]:
+    """Warnings without the part that differs from run to run."""
+    return Counter(text.split(" by ")[0].split(": ", 1)[0] + " | " + _tail(text) for _, text in done.found.warnings)
+
+
+def _tail(text: str) -> str:
+    if "disagrees" in text:
+        return "runs at one point disagree by more than 2 standard errors"
+    return text.split(": ", 1)[-1]
+
+
+def show(done: Fit, console: Console) -> None:
+    """Print the fit as tables.
+
+    Parameters
+    ----------
+    done : The fit.
+    console : Where to print.
+    """
+    from rich.markup import escape
+    from rich.table import Table
+
+    table = Table(title=f"{done.campaign.vehicle.title}: {done.campaign.header.name}", title_justify="left")
+    for column, justify in (
+        ("coefficient", "left"),
+        ("points", "right"),
+        ("measured", "right"),
+        ("runs", "right"),
+        ("median error", "right"),
+        ("worst residual", "right"),
+        ("quality", "left"),
+    ):
+        table.add_column(column, justify=justify)  # type: ignore[arg-type]
+    factor = {k: q.factor for k, q in done.campaign.header.quality.items()}
+    for row in coefficient_table(done.rows):
+        words = [
+            f"[{'yellow' if factor[q] > 1 else 'green'}]{escape(q)} {n}[/]" for q, n in sorted(row["quality"].items())
+        ]
+        worst = row["worst_residual"]
+        table.add_row(
+            escape(row["coefficient"]),
+            str(row["points"]),
+            str(row["measured"]),
+            str(row["runs"]),
+            f"{100 * row['median_relative_error']:.1f} %",
+            f"[red]{worst:.1f} s.e.[/]" if worst > 2 else f"{worst:.1f} s.e." if worst else "-",
+            ", ".join(words),
+        )
+    console.print(table)
+    for text, count in _warnings(done).items():
+        subject, message = text.split(" | ")
+        console.print(f"[yellow]warning[/] {escape(subject)}: {escape(message)} ({count}x)")
+    reasons = _reasons(done)
+    used = {r for n in done.found.nodes for r in n.runs}
+    total = done.campaign.runs["run_id"]
+    console.print(f"{len(used)} of {len(total)} runs used; loads left out, with the reason:")
+    for (file, output, reason), ids in reasons.items():
+        shown = ", ".join(ids[:4]) + (f", ... {len(ids)} runs" if len(ids) > 4 else "")
+        console.print(f"  {escape(file)} {output}: {escape(reason)} [{escape(shown)}]", highlight=False)
+    state = "committed" if done.new else "unchanged, nothing committed: already"
+    console.print(f"[bold]{state} version {done.version}[/]  digest {done.digest[:16]}", highlight=False)

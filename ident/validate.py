@@ -1,0 +1,262 @@
+"""`ident validate`: fly a case from the database and hold it against its references."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ident.metrics import zigzag
+from sim.case import Case, Series, load_case, load_reference
+from sim.coefficients import Coefficient, Coefficients
+from sim.database import axis_columns, read_rows, versions
+from sim.errors import InputError
+from sim.forces import boat_features, plane_features
+from sim.simulate import Simulation, simulate
+from sim.vehicle import load_vehicle
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+Array = NDArray[np.float64]
+# Samples of a record at which table coverage is looked at: enough for a share of time.
+_COVERAGE_SAMPLES = 200
+
+
+@dataclass(frozen=True)
+class Validation:
+    """One flown case with its comparison.
+
+    Attributes
+    ----------
+    case, simulation, reference : What was flown and what it is held against.
+    result : The JSON object of the comparison.
+    constant_axes : Term -> axes along which it was measured at one value only.
+    """
+
+    case: Case
+    simulation: Simulation
+    reference: Series
+    result: dict[str, Any]
+    constant_axes: dict[str, list[str]]
+
+
+def rmse(simulation: Simulation, channel: str, time: Array, value: Array) -> float:
+    """Root mean square difference at the reference's own times, in its unit (rad, SI)."""
+    return float(np.sqrt(np.mean((np.interp(time, simulation["t"], simulation[channel]) - value) ** 2)))
+
+
+def _errors(case: Case, simulation: Simulation, reference: Series) -> dict[str, Any]:
+    if case.reference is None:
+        return {}
+    found: dict[str, Any] = {}
+    end = float(simulation["t"][-1])
+    published = reference[case.reference.published_model or ""]
+    for source in case.reference.compare:
+        found[source] = {}
+        for channel in case.reference.channels:
+            if channel not in reference[source]:
+                continue
+            time, value, unit = reference[source][channel]
+            flown = time <= end + 1e-9
+            entry: dict[str, Any] = {
+                "rmse": rmse(simulation, channel, time[flown], value[flown]),
+                "unit": unit,
+                "n": int(flown.sum()),
+                "published_model_rmse": None,
+                "ratio": None,
+            }
+            if channel in published:
+                other = np.interp(time, published[channel][0], published[channel][1])
+                entry["published_model_rmse"] = float(np.sqrt(np.mean((other - value) ** 2)))
+                entry["ratio"] = entry["rmse"] / entry["published_model_rmse"]
+            found[source][channel] = entry
+    return found
+
+
+def _metrics(case: Case, simulation: Simulation, reference: Series) -> dict[str, dict[str, float | None]]:
+    dv, dh = case.command.dV, case.command.dH
+    if "zigzag" not in (dv.law, dh.law):
+        return {}
+    command, angle, rate, name = (dh, "psi", "r", "yaw") if dh.law == "zigzag" else (dv, "theta", "q", "pitch")
+    check, sense = math.radians(command.check_deg), 1 if command.first_deg > 0 else -1
+    columns = {}
+    flown = (simulation["t"], simulation[rate])
+    columns["simulated"] = zigzag(simulation["t"], simulation[angle], flown, check, sense, name)
+    for i, (time, _) in enumerate(simulation.executes[1:4]):
+        columns["simulated"][f"execute_{i + 2}_s"] = float(time)
+    sources = [*case.reference.compare, case.reference.published_model] if case.reference else []
+    for source in sources:
+        series = reference[source or ""]
+        if angle in series:
+            time, value, unit = series[angle]
+            scale = math.radians(1.0) if unit == "deg" else 1.0
+            turn = series.get(rate)
+            label = "published_model" if case.reference and source == case.reference.published_model else str(source)
+            columns[label] = zigzag(time, scale * value, turn[:2] if turn else None, check, sense, name)
+    return {k: {label: column.get(k) for label, column in columns.items()} for k in columns["simulated"]}
+
+
+def _states(simulation: Simulation, coefficients: Coefficients) -> tuple[list[dict[str, float]], list[dict[str, dict[str, float]]]]:
+    """Boat and plane features at evenly spread samples of a record."""
+    chosen = np.unique(np.linspace(0, len(simulation.record) - 1, _COVERAGE_SAMPLES).astype(int))
+    boat, planes = [], []
+    columns = {c: simulation.record[chosen, i] for i, c in enumerate(simulation.columns)}
+    wake = coefficients.get("w_T")
+    factor = 1.0 - (float(wake.values[0]) if wake else 0.0)
+    diameter = coefficients.vehicle.propeller.diameter.value
+    for i in range(len(chosen)):
+        velocity = [columns[c][i] for c in "uvw"]
+        rates = [columns[c][i] for c in "pqr"]
+        n = columns["n"][i]
+        advance = factor * velocity[0] / (n * diameter) if n else 0.0
+        boat.append(boat_features(velocity, rates, columns["z"][i] + simulation.depth_offset, n, advance))
+        planes.append({p.name: plane_features(p, velocity, rates, columns[p.name][i]) for p in coefficients.vehicle.planes})
+    return boat, planes
+
+
+def _outside(simulation: Simulation, coefficients: Coefficients) -> tuple[list[dict[str, Any]], dict[str, list[str]]]:
+    """Share of time each term was used beyond its data, and its one-valued axes."""
+    boat, planes = _states(simulation, coefficients)
+    found: list[dict[str, Any]] = []
+    constant: dict[str, list[str]] = {}
+    for coefficient in coefficients:
+        term, table = coefficient.term, coefficient.table
+        if term.is_acceleration or not term.axes:
+            continue
+        points = np.array(
+            [[{**b, **p.get(coefficient.part, {})}[a] for a in term.axes] for b, p in zip(boat, planes, strict=True)]
+        )
+        for k, axis in enumerate(term.axes):
+            low, high = table.range(axis)
+            if low == high:
+                constant.setdefault(term.name, []).append(axis)
+                continue
+            slack = 1e-9 * max(abs(low), abs(high))
+            share = float(np.mean((points[:, k] < low - slack) | (points[:, k] > high + slack)))
+            if share > 0.0:
+                found.append({"term": term.name, "axis": axis, "fraction_of_time": share})
+        found += _combined(coefficient, points)
+    return found, constant
+
+
+def _combined(coefficient: Coefficient, points: Array) -> list[dict[str, Any]]:
+    """Share of time at flow angles of which no run has both."""
+    axes = coefficient.term.axes
+    if not {"alpha", "beta"} <= set(axes) or coefficient.table.measured.all():
+        return []
+    varied = [a for a in ("alpha", "beta") if coefficient.table.range(a)[0] < coefficient.table.range(a)[1]]
+    if len(varied) < 2:
+        return []
+    share = float(np.mean([coefficient.table.covered(x) < 0.5 for x in points]))
+    return [{"term": coefficient.term.name, "axis": "alpha x beta", "fraction_of_time": share}] if share else []
+
+
+def _passed(case: Case, errors: dict[str, Any]) -> bool:
+    for tolerance in case.tolerance:
+        entry = errors.get(tolerance.source, {}).get(tolerance.channel)
+        if entry is None or entry["unit"] != tolerance.unit:
+            raise InputError(
+                f"case {case.name}, tolerance on {tolerance.source} {tolerance.channel} [{tolerance.unit}]",
+                "no such reference channel in that unit",
+                "a source, channel and unit of the reference file",
+            )
+        if not entry["rmse"] <= tolerance.rmse:
+            return False
+    return True
+
+
+def validate(name: str, db: str, version: int | None = None) -> Validation:
+    """Fly a case from a database version and compare.
+
+    Parameters
+    ----------
+    name : Bundled case or path to a case file.
+    db : Database path or URL.
+    version : Database version, latest when None.
+
+    Raises
+    ------
+    InputError
+        For a case, reference, database or version that does not exist or does not fit.
+    sim.trim.NoEquilibrium
+        When the case starts from self-propulsion and there is none.
+    """
+    case, where = load_case(name)
+    reference = load_reference(case, where)
+    vehicle_name: str | Path = case.vehicle
+    if case.vehicle.endswith(".toml"):
+        vehicle_name = Path(where).parent / case.vehicle
+    vehicle = load_vehicle(vehicle_name)
+    rows, number = read_rows(db, version, vehicle.name)
+    coefficients = Coefficients(vehicle, rows)
+    simulation = simulate(case, coefficients)
+    errors = _errors(case, simulation, reference)
+    outside, constant = _outside(simulation, coefficients)
+    record = next(v for v in versions(db) if v.number == number)
+    finite = bool(np.isfinite(simulation.record).all())
+    complete = finite and simulation["t"][-1] >= case.run.duration_s - case.run.record_s
+    result = {
+        "case": case.name,
+        "database": {"path": db, "version": number, "digest": record.digest},
+        "references": errors,
+        "metrics": _metrics(case, simulation, reference),
+        "outside_tables": outside,
+        "passed": complete and _passed(case, errors),
+    }
+    return Validation(case, simulation, reference, result, constant)
+
+
+def _number(value: float | None, digits: int = 4) -> str:
+    return "-" if value is None else f"{value:.{digits}g}"
+
+
+def show(done: Validation, console: Console) -> None:
+    """Print errors, metrics and use beyond the data as tables."""
+    from rich.markup import escape
+    from rich.table import Table
+
+    result = done.result
+    database = result["database"]
+    console.print(f"[bold]{escape(done.case.title)}[/], database version {database['version']} ({database['digest'][:16]})")
+    if result["references"]:
+        table = Table("reference", "channel", "RMSE", "published model", "ratio", "unit", title="Errors")
+        for source, channels in result["references"].items():
+            for channel, e in channels.items():
+                ratio = e["ratio"]
+                text = "-" if ratio is None else f"[{'green' if ratio <= 1 else 'red'}]{ratio:.2f}[/]"
+                table.add_row(source, channel, _number(e["rmse"]), _number(e["published_model_rmse"]), text, e["unit"])
+        console.print(table)
+    if result["metrics"]:
+        labels = list(next(iter(result["metrics"].values())))
+        table = Table("metric", *labels, title="Metrics (ITTC)")
+        for metric, values in result["metrics"].items():
+            table.add_row(metric, *[_number(values[c]) for c in labels])
+        console.print(table)
+    _show_outside(done, console)
+    verdict = "[green]within[/]" if result["passed"] else "[red]outside[/]"
+    console.print(f"{verdict} the tolerances of the case file")
+
+
+def _show_outside(done: Validation, console: Console) -> None:
+    from rich.table import Table
+
+    units = {axis: column for column, axis in axis_columns().items()}
+    rows: dict[tuple[str, float], list[str]] = {}
+    for item in done.result["outside_tables"]:
+        rows.setdefault((item["axis"], round(item["fraction_of_time"], 3)), []).append(item["term"])
+    if rows:
+        table = Table("axis", "share of time", "terms", title="Used outside their data")
+        for (axis, share), terms in sorted(rows.items(), key=lambda r: -r[0][1]):
+            table.add_row(units.get(axis, axis), f"{100 * share:.1f} %", " ".join(terms))
+        console.print(table)
+    single: dict[str, list[str]] = {}
+    for term, axes in done.constant_axes.items():
+        for axis in axes:
+            single.setdefault(axis, []).append(term)
+    for axis, terms in single.items():
+        console.print(f"measured at one {units.get(axis, axis)} only, used at every other: {' '.join(terms)}", highlight=False)
