@@ -28,6 +28,9 @@ REQUIRED = ("run_id", "test", "part", "quality", "source")
 MOTION = ("p", "q", "r", "udot", "vdot", "wdot", "pdot", "qdot", "rdot")
 DIRECT = ("KT", "KQ", "t")
 
+# Flow beyond 60 deg from the axis is flow across the hull.
+_ACROSS = 0.5
+
 
 class _Part(BaseModel):
     model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
@@ -226,7 +229,7 @@ def read_runs(path: Path, header: CampaignFile, vehicle: Vehicle) -> pd.DataFram
 
 def _check_complete(path: Path, runs: pd.DataFrame) -> None:
     """Every run has what its test needs, a load or coefficient, and an error to go with it."""
-    for i, run in runs.iterrows():
+    for _, run in runs.iterrows():
         place = f"{path}, row {run['row']}"
         for need in str(tests().loc[run["test"], "requires"]).split():
             quantity = "plane" if need == "delta" else need
@@ -273,15 +276,20 @@ def _to_full_scale(runs: pd.DataFrame, ratio: float) -> pd.DataFrame:
 
 
 def _move_moments(runs: pd.DataFrame, point: list[float]) -> pd.DataFrame:
-    """Moments about the origin: M_O = M_P + r_P x F. Missing loads stay missing."""
-    if not any(point):
-        return runs
-    moved = runs.copy()
-    force = [moved[o].fillna(0.0) for o in "XYZ"]
+    """Moments about the origin: M_O = M_P + r_P x F. Missing moments stay missing."""
     x, y, z = point
-    moved["K"] = moved["K"] + y * force[2] - z * force[1]
-    moved["M"] = moved["M"] + z * force[0] - x * force[2]
-    moved["N"] = moved["N"] + x * force[1] - y * force[0]
+    levers = {"K": {"Z": y, "Y": -z}, "M": {"X": z, "Z": -x}, "N": {"Y": x, "X": -y}}
+    moved = runs.copy()
+    for moment, arms in levers.items():
+        for force, arm in arms.items():
+            if arm == 0.0:
+                continue
+            bare = runs[moment].notna() & runs[force].isna()
+            if bare.any():
+                run = runs[bare].iloc[0]
+                place = f"{run['file']}, row {run['row']}, column {force}"
+                raise InputError(place, "nothing", f"a number: moving {moment} to the vehicle's origin needs {force}")
+            moved[moment] = moved[moment] + arm * runs[force]
     return moved
 
 
@@ -290,9 +298,10 @@ def _standard_errors(runs: pd.DataFrame, header: CampaignFile, length: float) ->
     out = runs.copy()
     factor = out["quality"].map({k: q.factor for k, q in header.quality.items()}).astype(float)
     original = out["copy_of"].map(dict(zip(out["run_id"], factor, strict=True))).astype(float)
-    factor = np.fmax(factor, original)
+    factor = factor.where(~(original > factor), original)
     still = {k: out[k].fillna(0.0) == 0.0 for k in MOTION}
-    still["u"] = (np.cos(out["alpha"].fillna(0.0)) * np.cos(out["beta"].fillna(0.0))).abs() < 0.5
+    along = np.cos(out["alpha"].fillna(0.0)) * np.cos(out["beta"].fillna(0.0))
+    still["u"] = pd.Series(along, index=out.index).abs() < _ACROSS
     kind = pd.DataFrame(still).apply(lambda moves: "".join("01"[m] for m in moves), axis=1)
     rate2 = sum(out[c].fillna(0.0) ** 2 for c in ("p", "q", "r"))
     dynamic = out["U"].fillna(0.0) ** 2 + rate2 * length**2

@@ -14,6 +14,10 @@ from ident import __version__
 DB = click.option("--db", default="coeff_db", show_default=True, help="Database folder or object-store URL.")
 VERSION = click.option("--version", "version", type=int, default=None, help="Database version; latest by default.")
 
+OUT = click.option(
+    "--out", type=click.Path(path_type=Path), default=Path("reports"), show_default=True, help="Folder to write to."
+)
+
 
 class Commands(click.Group):
     """Turns a user's mistake into one message and exit code 2."""
@@ -97,7 +101,7 @@ def fit(folder: Path, db: str, message: str, json_path: str | None) -> None:
 @click.option("--case", "case", required=True, help="Bundled case name, or path to a case file.")
 @DB
 @VERSION
-@click.option("--out", type=click.Path(path_type=Path), default=Path("reports"), show_default=True, help="Figures go here.")
+@OUT
 @click.option("--json", "json_path", default=None, metavar="PATH|-", help="Write the comparison as JSON.")
 @click.option("--strict", is_flag=True, help="Exit 1 when a tolerance of the case file is missed.")
 def validate(case: str, db: str, version: int | None, out: Path, json_path: str | None, strict: bool) -> None:
@@ -133,7 +137,7 @@ def validate(case: str, db: str, version: int | None, out: Path, json_path: str 
 @DB
 @VERSION
 @click.option("--vehicle", default="bb2", show_default=True, help="Bundled vehicle name, or path to a vehicle file.")
-@click.option("--out", type=click.Path(path_type=Path), default=Path("reports"), show_default=True, help="Folder for the page.")
+@OUT
 def report(db: str, version: int | None, vehicle: str, out: Path) -> None:
     """Write one self-contained HTML page on a database version.
 

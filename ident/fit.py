@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     import pandas as pd
     from rich.console import Console
 
-SECTIONS = "sectional added mass"
+_UNUSED = ("run_id", "file", "row", "output", "reason")
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ class Fit:
             "digest": self.digest,
             "runs": len(self.campaign.runs),
             "coefficients": coefficient_table(self.rows),
-            "unused": [dict(zip(("run_id", "file", "row", "output", "reason"), u, strict=True)) for u in self.found.unused],
+            "unused": [dict(zip(_UNUSED, u, strict=True)) for u in self.found.unused],
             "warnings": [{"subject": s, "message": m} for s, m in self.found.warnings],
         }
 

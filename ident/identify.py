@@ -19,10 +19,10 @@ from dataclasses import dataclass, field
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from ident.campaign import DIRECT, Campaign, tests
+from ident.least_squares import gain_matrix, weights
+from ident.wake import wake_fraction
 from sim.catalogue import OUTPUTS, Term
 from sim.forces import axis_values, boat_features, body_velocity, multiplier, plane_features
 from sim.parts import Mirror, Point, mirror_of, parts_of, vehicle_terms
@@ -149,9 +149,9 @@ class _Solver:
         if found is None:
             return None
         table, nodes, signs = found
-        weights = table.weights(axis_values(term, features)) * np.array(signs)
+        shares = table.weights(axis_values(term, features)) * np.array(signs)
         row: dict[int, float] = {}
-        for node, weight in zip(nodes, weights, strict=True):
+        for node, weight in zip(nodes, shares, strict=True):
             if weight != 0.0:
                 row[node] = row.get(node, 0.0) + float(weight)
         return row
@@ -201,9 +201,8 @@ class _Solver:
             elif run["decoupled"] != "True":
                 row = self.row(term, run["part"], features)
                 if row is None:
-                    self.warnings.append(
-                        (run["run_id"], f"{term.name} acts on this run but no test identifies it: not subtracted")
-                    )
+                    text = f"{term.name} acts on this run but no test identifies it: not subtracted"
+                    self.warnings.append((run["run_id"], text))
                     continue
                 for node, weight in row.items():
                     known[node] = known.get(node, 0.0) + factor * weight
@@ -212,9 +211,8 @@ class _Solver:
             return Equation(run, output, value, sigma, unknowns, known)
         if zero_by_symmetry:
             if abs(value) > 2.0 * sigma and value != 0.0:
-                self.warnings.append(
-                    (run["run_id"], f"{output} = {value:g} where port/starboard symmetry makes it zero")
-                )
+                text = f"{output} = {value:g} where port/starboard symmetry makes it zero"
+                self.warnings.append((run["run_id"], text))
         elif value != 0.0:
             self.skip(run, output, "no term of the vehicle's set acts on this load in this state")
         return None
@@ -259,12 +257,11 @@ class _Solver:
                 b[i, node] = factor
         sigma = np.array([e.sigma for e in equations])
         y = np.array([e.value for e in equations]) - b @ self.values
-        gain, lost = _gain(a, _weights(a, sigma))
+        gain, lost = gain_matrix(a, weights(a, sigma))
         for node in lost:
             bad = self.nodes[first + node]
-            self.warnings.append(
-                (bad.name, f"{bad.part} at {bad.point}: the runs cannot tell it from other terms; dropped")
-            )
+            text = f"{bad.part} at {bad.point}: the runs cannot tell it from other terms; dropped"
+            self.warnings.append((bad.name, text))
         new = gain @ y
         noise = gain @ _error_covariance(equations, sigma) @ gain.T
         cross = -gain @ b @ self.covariance
@@ -339,37 +336,6 @@ def mirror_of_name(found: _Solver | Identification, name: str, part: str) -> Mir
     return mirror_of(term, part, vehicle)
 
 
-def _weights(a: Array, sigma: Array) -> Array:
-    """1/sigma; runs without any error get the weight of the best run beside them."""
-    scale = np.abs(a).max(axis=1)
-    relative = sigma / scale
-    positive = relative[relative > 0.0]
-    least = 1e-3 * positive.min() if positive.size else 1.0
-    return 1.0 / (np.where(relative > 0.0, relative, least) * scale)
-
-
-def _gain(a: Array, weight: Array) -> tuple[Array, list[int]]:
-    """Weighted least-squares operator, block by block, and the columns it cannot find."""
-    n_rows, n_columns = a.shape
-    rows, columns = np.nonzero(a)
-    links = coo_array((np.ones(rows.size), (rows, n_rows + columns)), shape=(n_rows + n_columns,) * 2)
-    _, label = connected_components(links, directed=False)
-    gain = np.zeros((n_columns, n_rows))
-    lost: list[int] = []
-    for block in np.unique(label[n_rows:]):
-        r, c = np.flatnonzero(label[:n_rows] == block), np.flatnonzero(label[n_rows:] == block)
-        local = a[np.ix_(r, c)] * weight[r, None]
-        size = np.linalg.norm(local, axis=0)
-        u, s, vt = np.linalg.svd(local / size, full_matrices=False)
-        good = s > 1e-9 * s[0]
-        if good.sum() < c.size:
-            null = np.linalg.svd(local / size)[2][good.sum() :]
-            lost += [int(c[k]) for k in range(c.size) if np.abs(null[:, k]).max() > 1e-6]
-        inverse = (vt[good].T / s[good]) @ u[:, good].T
-        gain[np.ix_(c, r)] = inverse / size[:, None] * weight[r][None, :]
-    return gain, lost
-
-
 def _error_covariance(equations: list[Equation], sigma: Array) -> Array:
     """Measurement covariance: copies of a run share its error, with the sign of the load."""
     covariance = np.diag(sigma**2)
@@ -385,59 +351,23 @@ def _error_covariance(equations: list[Equation], sigma: Array) -> Array:
     return covariance
 
 
-def _wake_fraction(solver: _Solver, run: pd.Series) -> None:
-    """Taylor wake fraction from the revolutions at self-propulsion, Eq. (48).
-
-    (1-t) KT(J) rho n^2 D^4 balances the hull and all undeflected planes;
-    w_T = 1 - J n D / U.
-    """
-    state = run.copy()
-    needed: dict[int, float] = {}
-    for part in ("hull", *solver.planes):
-        state["part"] = part
-        features = solver.features(state)
-        for term, m in solver.active(state, "X", features):
-            row = solver.row(term, part, features)
-            if row is None:
-                solver.skip(run, "n", f"{term.name} is not identified, so the resistance is incomplete")
-                return
-            for node, weight in row.items():
-                needed[node] = needed.get(node, 0.0) + solver.scales[term.name] * m * weight
-    thrust, deduction = solver.by_name["KT"], solver.by_name["t"]
-    features = solver.features(run)
-    t_row = solver.row(deduction, "propeller", features)
-    kt = solver.table(thrust, "propeller")
-    if t_row is None or kt is None:
-        solver.skip(run, "n", "no open-water curve or thrust deduction")
+def _propulsion_point(solver: _Solver, runs: pd.DataFrame) -> None:
+    """The wake fraction from the first self-propulsion run that gives revolutions."""
+    speeds = runs[(runs["test"] == "self_propulsion") & runs["n"].notna()]
+    if "w_T" not in solver.by_name or speeds.empty:
         return
-    table, kt_nodes, _ = kt
-    involved = sorted({*needed, *t_row, *kt_nodes})
-
-    def wake(values: Array, n: float) -> float:
-        resistance = -sum(f * values[i] for i, f in needed.items())
-        t = sum(f * values[i] for i, f in t_row.items())
-        wanted = resistance / ((1.0 - t) * solver.scales["KT"] * n * abs(n))
-        order = np.argsort(table.points[:, 0])
-        j, k = table.points[order, 0], values[np.array(kt_nodes)[order]]
-        return 1.0 - float(np.interp(-wanted, -k, j)) * n * solver.diameter / float(run["U"])
-
-    n = float(run["n"])
-    value = wake(solver.values, n)
-    gradient = np.zeros(solver.values.size)
-    for i in involved:
-        step = 1e-6 * max(abs(solver.values[i]), 1e-6)
-        up, down = solver.values.copy(), solver.values.copy()
-        up[i] += step
-        down[i] -= step
-        gradient[i] = (wake(up, n) - wake(down, n)) / (2.0 * step)
-    dn = 1e-6 * n
-    by_n = (wake(solver.values, n + dn) - wake(solver.values, n - dn)) / (2.0 * dn)
-    row = gradient @ solver.covariance
-    variance = float(row @ gradient) + (by_n * float(run["rel_sigma"]) * n) ** 2
+    first = speeds.iloc[0]
+    found = wake_fraction(solver, first)
+    if isinstance(found, str):
+        solver.skip(first, "n", found)
+        return
     term = solver.by_name["w_T"]
-    node = solver.append((term.name, term.part, ()), value, variance, row)
-    solver.nodes[node].runs.append(run["run_id"])
-    solver.nodes[node].qualities.append(run["quality"])
+    node = solver.append((term.name, term.part, ()), *found)
+    solver.nodes[node].runs.append(first["run_id"])
+    solver.nodes[node].qualities.append(first["quality"])
+    for _, run in speeds.iloc[1:].iterrows():
+        solver.skip(run, "n", "the wake fraction is taken from the first self-propulsion run that gives n")
+    solver.tables.clear()
 
 
 def identify(campaign: Campaign) -> Identification:
@@ -459,14 +389,5 @@ def identify(campaign: Campaign) -> Identification:
         equations = [e for _, run in runs.iterrows() for e in solver.equations(run)]
         solver.solve(equations, first)
         solver.tables.clear()
-        speeds = runs[(runs["test"] == "self_propulsion") & runs["n"].notna()]
-        if "w_T" in solver.by_name and not speeds.empty:
-            if len(speeds) > 1:
-                solver.warnings.append(
-                    ("w_T", f"taken from {speeds.iloc[0]['run_id']}; other self-propulsion revolutions not used")
-                )
-            _wake_fraction(solver, speeds.iloc[0])
-            for _, run in speeds.iloc[1:].iterrows():
-                solver.skip(run, "n", "the wake fraction is taken from the first self-propulsion run that gives n")
-            solver.tables.clear()
+        _propulsion_point(solver, runs)
     return Identification(campaign, solver.nodes, solver.values, solver.covariance, solver.unused, solver.warnings)

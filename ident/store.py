@@ -16,6 +16,8 @@ from sim.database import COUNTS, NUMBERS, axis_columns, column_order, read_rows,
 from sim.errors import InputError
 from sim.parts import parts_of, vehicle_terms
 
+# A conflicting commit of another fit is looked at again this often.
+_TRIES = 3
 _ORIGIN = {1: "measured", -1: "measured", 0: "symmetry"}
 
 
@@ -45,7 +47,12 @@ def database_rows(found: Identification) -> pd.DataFrame:
             for point, index, sign in zip(*found.points(term, part), strict=True):
                 node = found.nodes[index]
                 own = (node.name, node.part, node.point) == (term.name, part, point)
-                row = {"vehicle": vehicle.name, "coefficient": term.name, "part": part, "output": term.output}
+                row: dict[str, Any] = {
+                    "vehicle": vehicle.name,
+                    "coefficient": term.name,
+                    "part": part,
+                    "output": term.output,
+                }
                 row |= {columns[a]: to_column(columns[a], x) for a, x in zip(term.axes, point, strict=True)}
                 row |= {
                     "value": sign * found.values[index] + 0.0,
@@ -63,12 +70,11 @@ def database_rows(found: Identification) -> pd.DataFrame:
     if not rows:
         raise InputError(found.campaign.header.name, "the runs identify nothing", "runs of at least one known test")
     table = pd.DataFrame(rows).reindex(columns=column_order())
-    for row in table[~np.isfinite(table[list(NUMBERS)]).all(axis=1)].to_dict("records"):
-        raise InputError(
-            found.campaign.header.name,
-            f"{row['coefficient']} of {row['part']} is not finite",
-            "finite loads and errors",
-        )
+    finite = np.isfinite(table[list(NUMBERS)].to_numpy(dtype=float)).all(axis=1)
+    if not finite.all():
+        bad = table[~finite].iloc[0]
+        text = f"{bad['coefficient']} of {bad['part']} is not finite"
+        raise InputError(found.campaign.header.name, text, "loads and errors of a size the arithmetic holds")
     return table
 
 
@@ -116,42 +122,50 @@ def commit(path: str, rows: pd.DataFrame, metadata: dict[str, str]) -> tuple[int
     local = Path(path)
     if "://" not in path and local.exists() and not local.is_dir():
         raise InputError(path, "a file", "a folder for the database")
-    content = digest(rows)
-    vehicle = str(rows["vehicle"].iloc[0])
-    exists = "://" in path or (local / "_delta_log").is_dir()
-    parent = ""
-    if exists:
-        history = versions(path)
-        parent = str(history[-1].number)
+    content, vehicle = digest(rows), str(rows["vehicle"].iloc[0])
+    for attempt in range(_TRIES):
+        parent, number = _latest(path, vehicle, content)
+        if number is not None:
+            return number, False
+        own = {"digest": content, "program": f"ident {__version__}", "parent": parent, "vehicle": vehicle}
+        properties = CommitProperties(custom_metadata={**metadata, **own})
         try:
-            present, number = read_rows(path, vehicle=vehicle)
-            if digest(present) == content:
-                return number, False
-        except InputError:
-            pass
-    properties = {
-        **metadata,
-        "digest": content,
-        "program": f"ident {__version__}",
-        "parent": parent,
-        "vehicle": vehicle,
-    }
+            if parent:
+                replaced = f"vehicle = '{vehicle}'"
+                write_deltalake(
+                    path,
+                    _arrow(rows),
+                    mode="overwrite",
+                    schema_mode="merge",
+                    predicate=replaced,
+                    commit_properties=properties,
+                )
+            else:
+                write_deltalake(path, _arrow(rows), mode="error", commit_properties=properties)
+        except (CommitFailedError, DeltaError) as error:
+            # Another fit committed in between: look again, then give up.
+            if attempt == _TRIES - 1:
+                raise InputError(path, f"another fit wrote at the same time: {error}", "run the fit again") from error
+            continue
+        except OSError as error:
+            raise InputError(path, f"cannot be written: {error}", "a folder you may write to") from error
+        return _own_version(path, content), True
+    raise AssertionError("unreachable: the last try returns or raises")
+
+
+def _latest(path: str, vehicle: str, content: str) -> tuple[str, int | None]:
+    """Parent version (empty for a new database), and the version that holds ``content``."""
+    if "://" not in path and not (Path(path) / "_delta_log").is_dir():
+        return "", None
+    parent = str(versions(path)[-1].number)
     try:
-        if exists:
-            write_deltalake(
-                path,
-                _arrow(rows),
-                mode="overwrite",
-                schema_mode="merge",
-                predicate=f"vehicle = '{vehicle}'",
-                commit_properties=CommitProperties(custom_metadata=properties),
-            )
-        else:
-            write_deltalake(
-                path, _arrow(rows), mode="error", commit_properties=CommitProperties(custom_metadata=properties)
-            )
-    except (CommitFailedError, DeltaError) as error:
-        raise InputError(path, f"another fit wrote at the same time: {error}", "run the fit again") from error
-    except OSError as error:
-        raise InputError(path, f"cannot be written: {error}", "a folder you may write to") from error
-    return versions(path)[-1].number, True
+        present, number = read_rows(path, vehicle=vehicle)
+    except InputError:
+        # No rows of this vehicle yet.
+        return parent, None
+    return parent, number if digest(present) == content else None
+
+
+def _own_version(path: str, content: str) -> int:
+    """The newest version with this content; another fit may have committed after it."""
+    return next(v.number for v in reversed(versions(path)) if v.digest == content)

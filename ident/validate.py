@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
 Array = NDArray[np.float64]
+Features = dict[str, float]
 # Samples of a record at which table coverage is looked at: enough for a share of time.
 _COVERAGE_SAMPLES = 200
 
@@ -101,27 +102,28 @@ def _metrics(case: Case, simulation: Simulation, reference: Series) -> dict[str,
     return {k: {label: column.get(k) for label, column in columns.items()} for k in columns["simulated"]}
 
 
-def _states(simulation: Simulation, coefficients: Coefficients) -> tuple[list[dict[str, float]], list[dict[str, dict[str, float]]]]:
-    """Boat and plane features at evenly spread samples of a record."""
+def _states(simulation: Simulation, coefficients: Coefficients) -> list[tuple[Features, dict[str, Features]]]:
+    """Boat features, and features by plane, at evenly spread samples of a record."""
     chosen = np.unique(np.linspace(0, len(simulation.record) - 1, _COVERAGE_SAMPLES).astype(int))
-    boat, planes = [], []
+    found: list[tuple[Features, dict[str, Features]]] = []
     columns = {c: simulation.record[chosen, i] for i, c in enumerate(simulation.columns)}
     wake = coefficients.get("w_T")
     factor = 1.0 - (float(wake.values[0]) if wake else 0.0)
-    diameter = coefficients.vehicle.propeller.diameter.value
+    vehicle = coefficients.vehicle
     for i in range(len(chosen)):
         velocity = [columns[c][i] for c in "uvw"]
         rates = [columns[c][i] for c in "pqr"]
         n = columns["n"][i]
-        advance = factor * velocity[0] / (n * diameter) if n else 0.0
-        boat.append(boat_features(velocity, rates, columns["z"][i] + simulation.depth_offset, n, advance))
-        planes.append({p.name: plane_features(p, velocity, rates, columns[p.name][i]) for p in coefficients.vehicle.planes})
-    return boat, planes
+        advance = factor * velocity[0] / (n * vehicle.propeller.diameter.value) if n else 0.0
+        boat = boat_features(velocity, rates, columns["z"][i] + simulation.depth_offset, n, advance)
+        planes = {p.name: plane_features(p, velocity, rates, columns[p.name][i]) for p in vehicle.planes}
+        found.append((boat, planes))
+    return found
 
 
 def _outside(simulation: Simulation, coefficients: Coefficients) -> tuple[list[dict[str, Any]], dict[str, list[str]]]:
     """Share of time each term was used beyond its data, and its one-valued axes."""
-    boat, planes = _states(simulation, coefficients)
+    states = _states(simulation, coefficients)
     found: list[dict[str, Any]] = []
     constant: dict[str, list[str]] = {}
     for coefficient in coefficients:
@@ -129,11 +131,11 @@ def _outside(simulation: Simulation, coefficients: Coefficients) -> tuple[list[d
         if term.is_acceleration or not term.axes:
             continue
         points = np.array(
-            [[{**b, **p.get(coefficient.part, {})}[a] for a in term.axes] for b, p in zip(boat, planes, strict=True)]
+            [[{**boat, **planes.get(coefficient.part, {})}[a] for a in term.axes] for boat, planes in states]
         )
         for k, axis in enumerate(term.axes):
             low, high = table.range(axis)
-            if low == high:
+            if low == high and term.extrapolation[axis] != "absent":
                 constant.setdefault(term.name, []).append(axis)
                 continue
             slack = 1e-9 * max(abs(low), abs(high))
@@ -222,7 +224,9 @@ def show(done: Validation, console: Console) -> None:
 
     result = done.result
     database = result["database"]
-    console.print(f"[bold]{escape(done.case.title)}[/], database version {database['version']} ({database['digest'][:16]})")
+    console.print(
+        f"[bold]{escape(done.case.title)}[/], database version {database['version']} ({database['digest'][:16]})"
+    )
     if result["references"]:
         table = Table("reference", "channel", "RMSE", "published model", "ratio", "unit", title="Errors")
         for source, channels in result["references"].items():
@@ -259,4 +263,6 @@ def _show_outside(done: Validation, console: Console) -> None:
         for axis in axes:
             single.setdefault(axis, []).append(term)
     for axis, terms in single.items():
-        console.print(f"measured at one {units.get(axis, axis)} only, used at every other: {' '.join(terms)}", highlight=False)
+        console.print(
+            f"measured at one {units.get(axis, axis)} only, used at every other: {' '.join(terms)}", highlight=False
+        )

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim import kernel
-from sim.catalogue import BOAT_FEATURES, PLANE_FEATURES
+from sim.catalogue import BOAT_FEATURES
 from sim.forces import boat_features
 from sim.model import cross_matrix
 
@@ -34,7 +34,7 @@ def features(m: kernel.Model, y: Array, c: Array) -> Array:
     """Feature vector as ``kernel.fill_features`` fills it, the constant 1 last."""
     n = float(c[-1])
     advance = (1.0 - m.wake) * y[0] / (n * m.diameter) if n else 0.0
-    boat = boat_features(y[:3], y[3:6], y[8] + m.sail_top, n, advance)
+    boat = boat_features(list(y[:3]), list(y[3:6]), y[8] + m.sail_top, n, advance)
     through = y[:3] + np.cross(y[3:6], m.planes[:, :3])
     speed = np.linalg.norm(through, axis=1)
     sine = -np.einsum("ij,ij->i", through, m.planes[:, 3:]) / np.where(speed > 0.0, speed, 1.0)
