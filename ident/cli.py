@@ -230,3 +230,7 @@ def export(folder: Path, kind: str, db: str, version: int | None) -> None:
     from ident.compare import export as run
 
     click.echo(str(run(db, version, kind, folder)))
+
+
+if __name__ == "__main__":
+    main()

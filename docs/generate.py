@@ -1,0 +1,144 @@
+"""Rewrite what the documentation takes from the program: ``python docs/generate.py``.
+
+Fits the bundled campaign into a temporary database, flies hzz20 and replaces the marked
+blocks of README.md and docs/*.md; ``--check`` only says whether they are current.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import sys
+import tempfile
+from pathlib import Path
+
+from ident.derivatives import derivatives
+from ident.figures import case_figure
+from ident.fit import fit
+from ident.validate import Validation, validate
+from sim import catalogue
+from sim.case import load_case
+from sim.coefficients import Coefficients
+from sim.model import Environment
+
+ROOT = Path(__file__).resolve().parents[1]
+CASE = "hzz20"
+
+
+def table(header: list[str], rows: list[list[str]]) -> str:
+    """A Markdown table."""
+    lines = ["| " + " | ".join(header) + " |", "|" + " --- |" * len(header)]
+    return "\n".join([*lines, *["| " + " | ".join(c.replace("|", "\\|") for c in row) + " |" for row in rows]])
+
+
+def signs(coefficients: Coefficients) -> str:
+    """Derivatives beside SUBOFF's."""
+    case, _ = load_case(CASE)
+    environment = Environment(case.environment.density_kgpm3, case.environment.gravity_mps2)
+    found = derivatives(coefficients, environment, case.initial.speed_mps, case.initial.depth_m, 0.0)
+    rows = [
+        [
+            f"`{d.symbol}`",
+            f"{d.hull:+.4f}",
+            f"{d.whole:+.4f}",
+            "positive" if d.expected > 0 else "negative",
+            "yes" if d.ok else "**no**",
+            "-" if d.suboff is None else f"{d.suboff:+.4f}",
+        ]
+        for d in found
+    ]
+    return table(["derivative", "hull and sail", "whole boat", "expected", "as expected", "SUBOFF, appended"], rows)
+
+
+def accuracy(done: Validation) -> str:
+    """Errors and metrics of the case."""
+    errors = [
+        [source, f"`{channel}`", e["unit"], *[f"{e[k]:.3g}" for k in ("rmse", "published_model_rmse", "ratio")]]
+        for source, channels in done.result["references"].items()
+        for channel, e in channels.items()
+    ]
+    labels = ["simulated", "EXP", "CFD", "published_model"]
+    metrics = [
+        [f"`{m}`", *["-" if values[c] is None else f"{values[c]:.3g}" for c in labels]]
+        for m, values in done.result["metrics"].items()
+    ]
+    digest = done.result["database"]["digest"][:16]
+    return "\n\n".join(
+        [
+            f"Case `{CASE}`, captive-only database `{digest}`, no calibration, no factor:",
+            table(["reference", "channel", "unit", "RMSE", "published model's RMSE", "ratio"], errors),
+            table(["metric", *[c.replace("_", " ") for c in labels]], metrics),
+        ]
+    )
+
+
+def errata() -> str:
+    """The errata this program applies."""
+    with (ROOT / "ident" / "data" / "errata.csv").open(encoding="utf-8") as stream:
+        rows = list(csv.DictReader(stream))
+    return table(list(rows[0]), [list(r.values()) for r in rows])
+
+
+def term_table() -> str:
+    """Both term sets."""
+    parts = []
+    for name in catalogue.SETS:
+        rows = [
+            [
+                f"`{t.name}`",
+                t.part,
+                f"{t.norm}^{t.power}" if t.norm else "-",
+                f"`{t.multiplier}`" if t.factors else "-",
+                " ".join(t.axes) or "constant",
+                " ".join(f"{a}:{r}" for a, r in t.extrapolation.items()) or "-",
+                " ".join(t.tests),
+                t.equation,
+            ]
+            for t in catalogue.terms(name)
+        ]
+        head = ["coefficient", "part", "scale", "multiplier", "axes", "beyond the data", "test", "equation"]
+        parts.append(f"## Set `{name}`: {len(rows)} terms\n\n{table(head, rows)}")
+    return "\n\n".join(parts)
+
+
+def replace(path: Path, blocks: dict[str, str]) -> str:
+    """The file's text with its marked blocks replaced."""
+    text = path.read_text(encoding="utf-8")
+    for name, block in blocks.items():
+        start, end = f"<!-- {name} -->\n", f"\n<!-- /{name} -->"
+        if text.count(start) != 1 or text.count(end) != 1:
+            raise SystemExit(f"{path.name}: the block {name} must stand once")
+        head, rest = text.split(start)
+        text = head + start + block + end + rest.split(end)[1]
+    return text
+
+
+def main() -> int:
+    """Rewrite or check; returns the exit code."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--check", action="store_true", help="exit 1 when a block is not current")
+    only_check = parser.parse_args().check
+    with tempfile.TemporaryDirectory() as folder:
+        db = str(Path(folder) / "coeff_db")
+        fitted = fit(ROOT / "raw_captive_data", db)[0]
+        done = validate(CASE, db)
+        coefficients = Coefficients(fitted.campaign.vehicle, fitted.rows)
+        if not only_check:
+            case_figure(done, ROOT / "docs" / f"{CASE}.png")
+    wanted = {
+        ROOT / "README.md": {"signs": signs(coefficients), "accuracy": accuracy(done)},
+        ROOT / "docs" / "errata.md": {"errata": errata()},
+        ROOT / "docs" / "terms.md": {"terms": term_table()},
+    }
+    stale = [path for path, blocks in wanted.items() if replace(path, blocks) != path.read_text(encoding="utf-8")]
+    if only_check:
+        for path in stale:
+            print(f"{path.name} is not current: run python docs/generate.py")
+        return 1 if stale else 0
+    for path in stale:
+        path.write_text(replace(path, wanted[path]), encoding="utf-8")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,291 @@
+"""The report of one database version: a single self-contained HTML page."""
+
+from __future__ import annotations
+
+import contextlib
+import csv
+import json
+import os
+import re
+from collections.abc import Iterable
+from datetime import UTC, datetime
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from ident.derivatives import checks, derivatives
+from ident.report_figures import draw_figures, equations, quality_colours
+from sim import catalogue
+from sim.catalogue import Term
+from sim.coefficients import Coefficients
+from sim.database import Version, axis_columns, read_rows, versions
+from sim.errors import InputError
+from sim.frames import PROGRAM
+from sim.model import Environment
+from sim.parts import parts_of, vehicle_terms
+from sim.vehicle import Vehicle, load_vehicle
+
+RULES = {
+    "hold": "the value at the last point",
+    "linear": "the coefficient goes on straight",
+    "linear_load": "coefficient times axis goes on straight, so the coefficient tends to a constant",
+    "drift_odd": "Eq. (25), in-plane form, matched in value and slope at the last run, to 90 deg; constant beyond",
+    "drift_even": "Eq. (25), out-of-plane form, matched likewise",
+}
+_NUMBER = re.compile(r"(?<![\w.])[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?![\w.]*\w)")
+# Prime derivatives do not depend on density and gravity, so both may be anything.
+_UNIT = Environment(density=1.0, gravity=0.0)
+
+
+def _stored(metadata: dict[str, str], key: str, default: Any) -> Any:
+    """A JSON value of the commit, or ``default`` when it is missing or damaged."""
+    try:
+        found = json.loads(metadata.get(key, ""))
+    except ValueError:
+        return default
+    return found if isinstance(found, type(default)) else default
+
+
+def _commit(db: str, number: int, vehicle: str) -> Version:
+    """The commit that wrote the vehicle's rows of a version: others may have come later."""
+    history = [v for v in versions(db) if v.number <= number]
+    own = [v for v in history if v.metadata.get("vehicle", vehicle) == vehicle]
+    return (own or history or [Version(number, "", {})])[-1]
+
+
+def _time(stamp: str) -> str:
+    return datetime.fromtimestamp(int(stamp) / 1000, UTC).strftime("%Y-%m-%d %H:%M UTC") if stamp.isdigit() else stamp
+
+
+def _provenance(db: str, number: int, commit: Version, vehicle: Vehicle) -> list[tuple[str, str]]:
+    known = commit.metadata
+    options = _stored(known, "options", {})
+    return [
+        ("Database", db),
+        ("Version", str(number)),
+        ("Vehicle", f"{vehicle.name}: {vehicle.title}"),
+        ("Term set", f"{vehicle.term_set}, added mass from {vehicle.added_mass}"),
+        ("Committed", f"as version {commit.number}, {_time(commit.timestamp)}".rstrip(", ")),
+        ("Digest of the vehicle's rows (SHA-256)", commit.digest),
+        ("Parent version", known.get("parent", "") or "none: the first commit"),
+        ("Program", known.get("program", "")),
+        ("Message", known.get("message", "")),
+        ("Campaign", known.get("campaign", "")),
+        ("Facility", known.get("facility", "")),
+        ("Frame of the campaign", known.get("frame", "")),
+        ("Frame of the database", f"{PROGRAM} (SNAME)"),
+        ("Provenance", " ".join(known.get("provenance", "").split())),
+        ("Options of the fit", ", ".join(f"{k} = {v}" for k, v in options.items()) or "none"),
+    ]
+
+
+def _figure(x: float) -> str:
+    return f"{x:.5g}".replace("-", "\N{MINUS SIGN}")
+
+
+def _ranges(term: Term, rows: pd.DataFrame) -> list[str]:
+    """What the runs cover along each axis, in database units."""
+    found = []
+    for name in term.axes:
+        axis = catalogue.axes()[name]
+        values = sorted(rows[axis.column].unique())
+        unit = "" if axis.unit == "1" else f" {axis.unit}"
+        if len(values) == 1:
+            text = f"{_figure(values[0])}{unit} only"
+        elif name == "D0":
+            text = ", ".join(_figure(v) for v in values) + unit
+        else:
+            text = f"{_figure(values[0])} to {_figure(values[-1])}{unit} ({len(values)})"
+        found.append(f"{name}: {text}")
+    return found
+
+
+def _notes(term: Term, rows: pd.DataFrame) -> list[str]:
+    """What a reader should know before trusting the coefficient off its points."""
+    columns = {a: c for c, a in axis_columns().items()}
+    single = [a for a in term.axes if rows[columns[a]].nunique() == 1]
+    notes = [f"one {a} only: used at every {a}" for a in single]
+    if {"alpha", "beta"} <= set(term.axes) - set(single):
+        both = (rows[columns["alpha"]] != 0.0) & (rows[columns["beta"]] != 0.0)
+        if not both.any():
+            notes.append("no run has alpha and beta together: superposed")
+    if not (rows["origin"] == "measured").any():
+        notes.append("all from the partner plane's runs by the mirror")
+    return notes
+
+
+def _coverage(vehicle: Vehicle, rows: pd.DataFrame, factors: dict[str, float]) -> list[dict[str, Any]]:
+    """One row a term of the vehicle's set, with data or absent."""
+    found = []
+    for term in vehicle_terms(vehicle):
+        own = rows[rows["coefficient"] == term.name]
+        parts = parts_of(term, vehicle)
+        row: dict[str, Any] = {
+            "symbol": term.name,
+            "group": term.group,
+            "part": parts[0] if len(parts) == 1 else f"{own['part'].nunique()} of {len(parts)} sections",
+            "equation": equations(term),
+            "multiplier": term.multiplier or "1",
+            "tests": " ".join(term.tests),
+            "absent": own.empty,
+        }
+        if not own.empty:
+            origin = own["origin"].value_counts()
+            words = sorted({q for q in own["quality"] if q}, key=lambda q: factors.get(q, 0.0))
+            row |= {
+                "measured": int(origin.get("measured", 0)),
+                "mirror": int(origin.get("mirror", 0)),
+                "symmetry": int(origin.get("symmetry", 0)),
+                "ranges": _ranges(term, own),
+                "quality": words[-1] if words else "",
+                "worst_points": int((own["quality"] == words[-1]).sum()) if words else 0,
+                "worst": float(own["worst_residual"].max()),
+                "rules": [f"{a}: {r}" for a, r in term.extrapolation.items()],
+                "notes": _notes(term, own),
+            }
+        found.append(row)
+    return found
+
+
+def _signs(coefficients: Coefficients, rows: pd.DataFrame) -> dict[str, Any]:
+    """Derivatives at the largest tabulated speed and depth, where most data are."""
+    columns = {a: c for c, a in axis_columns().items()}
+    speed, depth = (float(rows[columns[a]].max()) for a in ("U", "D0"))
+    if speed > 0.0:
+        found = derivatives(coefficients, _UNIT, speed, 0.0 if depth != depth else depth)
+    else:
+        found = []
+    sources = list(dict.fromkeys(c.source for c in checks() if c.suboff is not None))
+    return {"speed": speed, "depth": depth, "rows": found, "passed": sum(d.ok for d in found), "sources": sources}
+
+
+def _pattern(text: str) -> tuple[str, list[float]]:
+    """A message with its numbers left out, and the numbers."""
+    return _NUMBER.sub("\N{HORIZONTAL ELLIPSIS}", text), [float(n) for n in _NUMBER.findall(text)]
+
+
+def _warnings(stored: Iterable[Any]) -> list[dict[str, Any]]:
+    """Warnings of the fit; the same text for the same coefficient counted together."""
+    groups: dict[str, dict[str, Any]] = {}
+    for entry in stored:
+        subject, message = (str(x) for x in entry)
+        text, numbers = _pattern(message)
+        group = groups.setdefault(text, {"text": text, "subjects": [], "numbers": [], "count": 0})
+        group["subjects"].append(subject)
+        group["numbers"] += numbers[:1]
+        group["count"] += 1
+    for group in groups.values():
+        numbers = sorted(group["numbers"])
+        group["range"] = " to ".join(dict.fromkeys(_figure(n) for n in (numbers[:1] + numbers[-1:])))
+        group["subjects"] = list(dict.fromkeys(group["subjects"]))
+    return list(groups.values())
+
+
+def _unused(stored: Iterable[Any]) -> list[dict[str, Any]]:
+    """Loads that were not used, by file and reason."""
+    groups: dict[tuple[str, str], dict[str, Any]] = {}
+    for entry in stored:
+        run, name, _, output, reason = (str(x) for x in entry)
+        group = groups.setdefault((name, reason), {"file": name, "reason": reason, "runs": {}, "count": 0})
+        group["runs"].setdefault(run, []).append(output)
+        group["count"] += 1
+    return list(groups.values())
+
+
+def _vocabulary(metadata: dict[str, str], rows: pd.DataFrame) -> list[dict[str, Any]]:
+    """Quality words by rising factor, with the number of points behind each."""
+    known = _stored(metadata, "quality", {})
+    counts = rows["quality"].value_counts()
+    words = sorted({*known, *(q for q in counts.index if q)}, key=lambda w: known.get(w, {}).get("factor", 1.0))
+    words.sort(key=lambda w: (known.get(w, {}).get("factor", 1.0), list(known).index(w) if w in known else 0))
+    return [
+        {
+            "word": w,
+            "factor": known.get(w, {}).get("factor"),
+            "meaning": known.get(w, {}).get("meaning", "not in the commit's vocabulary"),
+            "points": int(counts.get(w, 0)),
+        }
+        for w in words
+    ]
+
+
+def _errata() -> list[dict[str, str]]:
+    with (files("ident") / "data" / "errata.csv").open(encoding="utf-8") as stream:
+        return list(csv.DictReader(stream))
+
+
+def _content(db: str, number: int, vehicle: Vehicle, rows: pd.DataFrame) -> dict[str, Any]:
+    """Everything the template shows."""
+    commit = _commit(db, number, vehicle.name)
+    vocabulary = _vocabulary(commit.metadata, rows)
+    colours = quality_colours(q["word"] for q in vocabulary)
+    coverage = _coverage(vehicle, rows, {q["word"]: q["factor"] or 1.0 for q in vocabulary})
+    columns = {a: c for c, a in axis_columns().items()}
+    combined = (rows[columns["alpha"]].fillna(0.0) != 0.0) & (rows[columns["beta"]].fillna(0.0) != 0.0)
+    return {
+        "vehicle": vehicle,
+        "version": number,
+        "frame": str(PROGRAM),
+        "provenance": [(k, v) for k, v in _provenance(db, number, commit, vehicle) if v],
+        "inputs": _stored(commit.metadata, "inputs", {}),
+        "coverage": {g: [c for c in coverage if c["group"] == g] for g in dict.fromkeys(c["group"] for c in coverage)},
+        "present": [c for c in coverage if not c["absent"]],
+        "absent": [c for c in coverage if c["absent"]],
+        "combined": int(combined.sum()),
+        "rules": RULES,
+        "points": len(rows),
+        "pictures": draw_figures(vehicle, rows, colours, number),
+        "signs": _signs(Coefficients(vehicle, rows), rows),
+        "warnings": _warnings(_stored(commit.metadata, "warnings", [])),
+        "unused": _unused(_stored(commit.metadata, "unused", [])),
+        "vocabulary": vocabulary,
+        "colours": colours,
+        "errata": _errata(),
+    }
+
+
+def _write(path: Path, text: str) -> None:
+    """The whole file or nothing."""
+    temporary = path.with_name(f".{path.name}.{os.getpid()}")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        temporary.write_text(text, encoding="utf-8")
+        os.replace(temporary, path)
+    except OSError as error:
+        with contextlib.suppress(OSError):
+            temporary.unlink()
+        raise InputError(str(path), f"cannot be written: {error}", "a folder you may write to") from error
+
+
+def write_report(db: str, version: int | None, out: Path, vehicle: str = "bb2") -> Path:
+    """Write the report of one vehicle at one database version.
+
+    Parameters
+    ----------
+    db : Folder or object-store URL of the database.
+    version : Version number, latest when None.
+    out : Folder for the page; created when absent.
+    vehicle : Bundled name or path to a vehicle file.
+
+    Returns
+    -------
+    Path of ``<vehicle>_v<version>.html``: images, style and all in the one file.
+
+    Raises
+    ------
+    InputError
+        When database, version or vehicle do not exist, or the page cannot be written.
+    """
+    from jinja2 import Environment as Templates
+    from jinja2 import StrictUndefined
+
+    boat = load_vehicle(vehicle)
+    rows, number = read_rows(db, version, boat.name)
+    templates = Templates(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    source = (files("ident") / "templates" / "report.html.j2").read_text("utf-8")
+    page = templates.from_string(source).render(_content(db, number, boat, rows))
+    path = Path(out) / f"{re.sub(r'[^A-Za-z0-9._-]', '_', boat.name)}_v{number}.html"
+    _write(path, page)
+    return path
