@@ -242,6 +242,8 @@ def show(done: Validation, console: Console) -> None:
             table.add_row(metric, *[_number(values[c]) for c in labels])
         console.print(table)
     _show_outside(done, console)
+    if float(done.simulation["D0"].min()) < 0.0:
+        console.print("[red]the sail top left the water; the model holds for a fully submerged boat only[/]")
     verdict = "[green]within[/]" if result["passed"] else "[red]outside[/]"
     console.print(f"{verdict} the tolerances of the case file")
 

@@ -178,7 +178,7 @@ def check(term: Term) -> None:
     if set(term.extrapolation) != set(term.axes):
         problems.append("an extrapolation rule for each axis and no other")
     if not term.part.startswith(("stern_plane", "sail_plane")):
-        turned = {a: term.mirror_sign() for a in term.axes if axes()[a].mirror < 0}
+        turned = {a: term.mirror_sign() for a in term.axes if a in axes() and axes()[a].mirror < 0}
         if turned != term.parity:
             problems.append(f"parity {term.parity}, the mirror gives {turned}")
     if problems:

@@ -101,7 +101,7 @@ def fill_features(m, y, c, f):
     f[12], f[13] = speed, sqrt(cross2)
     f[14], f[15] = _sign(v), _sign(w)
     f[16] = atan2(w, u) if speed > 0.0 else 0.0
-    f[17] = asin(v / speed) if speed > 0.0 else 0.0
+    f[17] = asin(min(1.0, max(-1.0, v / speed))) if speed > 0.0 else 0.0
     f[18] = y[8] + m.sail_top
     n = c[n_planes]
     f[19], f[20] = n, abs(n)
@@ -118,7 +118,8 @@ def fill_features(m, y, c, f):
         size = sqrt(a * a + b * b + d * d)
         incidence = 0.0
         if size > 0.0:
-            incidence = asin(-(a * m.planes[i, 3] + b * m.planes[i, 4] + d * m.planes[i, 5]) / size)
+            sine = -(a * m.planes[i, 3] + b * m.planes[i, 4] + d * m.planes[i, 5]) / size
+            incidence = asin(min(1.0, max(-1.0, sine)))
         k = N_BOAT + N_PLANE * i
         f[k], f[k + 1], f[k + 2] = size, c[i] + incidence, c[i]
 
@@ -132,8 +133,11 @@ def _locate(nodes, start, count, rule, x):
     a, b = nodes[start + i], nodes[start + i + 1]
     if (a <= x <= b) or rule == LINEAR:
         return i, (x - a) / (b - a)
-    if rule == LINEAR_LOAD and a * b > 0.0 and x * a > 0.0:
+    if rule == LINEAR_LOAD and a * b > 0.0 and x * a > 0.0 and abs(x) > max(abs(a), abs(b)):
         return i, (1.0 / x - 1.0 / a) / (1.0 / b - 1.0 / a)
+    if x != x:
+        # Not a number must not look like a held value.
+        return i, x
     return i, 0.0 if x < a else 1.0
 
 

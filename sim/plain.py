@@ -22,7 +22,8 @@ Array = NDArray[np.float64]
 def _weights(nodes: Array, rule: int, x: float) -> tuple[int, Array]:
     i = int(np.clip(np.searchsorted(nodes, x, side="right") - 1, 0, nodes.size - 2))
     a, b = nodes[i], nodes[i + 1]
-    if rule == kernel.LINEAR_LOAD and not a <= x <= b and a * b > 0.0 and x * a > 0.0:
+    outward = a * b > 0.0 and x * a > 0.0 and abs(x) > max(abs(a), abs(b))
+    if rule == kernel.LINEAR_LOAD and outward:
         t = (1.0 / x - 1.0 / a) / (1.0 / b - 1.0 / a)
     else:
         t = (x - a) / (b - a)

@@ -9,8 +9,8 @@ standard error follows from the same weights.
   node, else completed without interaction, C(a,b) = C(a,b0) + C(a0,b) - C(a0,b0), from the
   nearest runs; this is the source's superposition X'(alpha) + X'(beta).
 * Beyond the points, per axis: ``hold``; ``linear`` (the coefficient goes on straight);
-  ``linear_load`` (coefficient times axis goes on straight, so the coefficient tends to a
-  constant); ``drift_odd`` and ``drift_even``: Eq. (25) matched in value and slope at the
+  ``linear_load`` (coefficient times axis goes on straight away from zero, so the coefficient
+  tends to a constant); ``drift_odd`` and ``drift_even``: Eq. (25) matched in value and slope at the
   last run, C0 cos^2 + A sin cos + B sin|sin| for in-plane loads, A cos^2 + B sin^2 for
   out-of-plane loads, up to 90 deg; ``absent`` (for a sign axis): zero on a side no run has.
 """
@@ -54,7 +54,7 @@ def axis_weights(nodes: Array, rule: str, x: float) -> Array:
     a, b = nodes[i], nodes[i + 1]
     if a <= x <= b or rule == "linear":
         t = (x - a) / (b - a)
-    elif rule == "linear_load" and a * b > 0.0 and x * a > 0.0:
+    elif rule == "linear_load" and a * b > 0.0 and x * a > 0.0 and abs(x) > max(abs(a), abs(b)):
         t = (1.0 / x - 1.0 / a) / (1.0 / b - 1.0 / a)
     else:
         t = 0.0 if x < a else 1.0

@@ -81,7 +81,11 @@ def self_propulsion(
     state, controls = build(found.x)
     left = float(np.abs(residual(found.x)).max())
     if not np.isfinite(left) or left > 1e-8:
-        raise NoEquilibrium(f"no self-propulsion state at {speed:.4g} m/s and D0 = {depth:.4g} m: {found.message}")
+        angles = ", ".join(f"{a:.1f}" for a in np.degrees(controls[:-1]))
+        raise NoEquilibrium(
+            f"no self-propulsion state at {speed:.4g} m/s and D0 = {depth:.4g} m; "
+            f"closest found: planes {angles} deg, pitch {np.degrees(state[10]):.1f} deg, n {controls[-1]:.3g} 1/s"
+        )
     if np.any(np.abs(controls[:-1]) > plane_limit):
         raise NoEquilibrium(f"self-propulsion at {speed:.4g} m/s and D0 = {depth:.4g} m needs a plane beyond its limit")
     # The path is straight: heading such that the course is along earth x.

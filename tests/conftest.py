@@ -1,0 +1,91 @@
+"""Session fixtures: the bundled campaign, what it identifies, and the model it gives."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ident.campaign import read_campaign
+from ident.identify import identify
+from ident.store import commit, database_rows
+from sim.catalogue import OUTPUTS
+from sim.coefficients import Coefficients
+from sim.forces import axis_values, boat_features, multiplier, plane_features
+from sim.model import Environment, assemble
+
+ROOT = Path(__file__).parents[1]
+
+
+@pytest.fixture(scope="session")
+def campaign():
+    return read_campaign(ROOT / "raw_captive_data" / "bb2")
+
+
+@pytest.fixture(scope="session")
+def identification(campaign):
+    return identify(campaign)
+
+
+@pytest.fixture(scope="session")
+def rows(identification):
+    return database_rows(identification)
+
+
+@pytest.fixture(scope="session")
+def coefficients(campaign, rows):
+    return Coefficients(campaign.vehicle, rows)
+
+
+@pytest.fixture(scope="session")
+def environment():
+    return Environment(1025.0, 9.81)
+
+
+@pytest.fixture(scope="session")
+def model(coefficients, environment):
+    return assemble(coefficients, environment)
+
+
+@pytest.fixture(scope="session")
+def fitted_db(rows, tmp_path_factory):
+    path = str(tmp_path_factory.mktemp("database") / "coeff_db")
+    commit(path, rows, {"message": "test"})
+    return path
+
+
+@pytest.fixture(scope="session")
+def plain_loads(coefficients, environment):
+    """Loads as the term table reads, without the kernel: sum of scale * C(axes) * m(state).
+
+    Called with a state and controls; returns the six loads and, for tolerances, the six sums
+    of absolute contributions.
+    """
+    vehicle = coefficients.vehicle
+    scales = (environment.density, vehicle.particulars.length.value, vehicle.propeller.diameter.value)
+    sail_top = vehicle.particulars.sail_top.value[2]
+    wake = float(coefficients.get("w_T").values[0])
+    deduction = coefficients.get("t")
+
+    def loads(y, c):
+        n = c[-1]
+        advance = (1.0 - wake) * y[0] / (n * scales[2]) if n else 0.0
+        boat = boat_features(y[:3], y[3:6], y[8] + sail_top, n, advance)
+        own = {
+            p.name: boat | plane_features(p, y[:3], y[3:6], angle)
+            for p, angle in zip(vehicle.planes, c[:-1], strict=True)
+        }
+        total, size = np.zeros(6), np.zeros(6)
+        for k in coefficients:
+            if k.term.is_acceleration or not k.term.output:
+                continue
+            features = own.get(k.part, boat)
+            value = k.at(axis_values(k.term, features)) * multiplier(k.term, features) * k.term.scale(*scales)
+            if k.term.name == "KT":
+                value *= 1.0 - deduction.at(axis_values(deduction.term, features))
+            total[OUTPUTS.index(k.term.output)] += value
+            size[OUTPUTS.index(k.term.output)] += abs(value)
+        return total, size
+
+    return loads
