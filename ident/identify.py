@@ -34,7 +34,10 @@ Key = tuple[str, str]
 
 @dataclass
 class Node:
-    """One unknown tabulated value: coefficient, part, point, and the runs behind it."""
+    """One unknown tabulated value: coefficient, part, point, and the runs behind it.
+
+    ``seen`` holds the (part, point) where runs stood: this one, its mirror image, or both.
+    """
 
     name: str
     part: str
@@ -42,6 +45,7 @@ class Node:
     runs: list[str] = field(default_factory=list)
     qualities: list[str] = field(default_factory=list)
     worst: float = 0.0
+    seen: set[tuple[str, Point]] = field(default_factory=set)
 
 
 @dataclass
@@ -197,6 +201,7 @@ class _Solver:
                     zero_by_symmetry = True
                     continue
                 node = self.node(key)
+                self.nodes[node].seen.add((run["part"], point))
                 unknowns[node] = unknowns.get(node, 0.0) + sign * factor
             elif run["decoupled"] != "True":
                 row = self.row(term, run["part"], features)
@@ -235,8 +240,9 @@ class _Solver:
                     self.skip(run, output, f"{output} is not taken from a {run['test']} run")
                     continue
                 key, _ = self.canonical(term.name, term.part, _key_point(axis_values(term, features)))
-                sigma = float(run[f"s_{output}"])
-                equation = Equation(run, output, float(run[output]), sigma, {self.node(key): 1.0}, {})
+                sigma, node = float(run[f"s_{output}"]), self.node(key)
+                self.nodes[node].seen.add((term.part, key[2]))
+                equation = Equation(run, output, float(run[output]), sigma, {node: 1.0}, {})
             if equation:
                 found.append(equation)
         return found
@@ -364,6 +370,7 @@ def _propulsion_point(solver: _Solver, runs: pd.DataFrame) -> None:
     term = solver.by_name["w_T"]
     node = solver.append((term.name, term.part, ()), *found)
     solver.nodes[node].runs.append(first["run_id"])
+    solver.nodes[node].seen.add((term.part, ()))
     solver.nodes[node].qualities.append(first["quality"])
     for _, run in speeds.iloc[1:].iterrows():
         solver.skip(run, "n", "the wake fraction is taken from the first self-propulsion run that gives n")

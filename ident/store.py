@@ -18,7 +18,6 @@ from sim.parts import parts_of, vehicle_terms
 
 # A conflicting commit of another fit is looked at again this often.
 _TRIES = 3
-_ORIGIN = {1: "measured", -1: "measured", 0: "symmetry"}
 
 
 def database_rows(found: Identification) -> pd.DataFrame:
@@ -46,7 +45,7 @@ def database_rows(found: Identification) -> pd.DataFrame:
         for part in parts_of(term, vehicle):
             for point, index, sign in zip(*found.points(term, part), strict=True):
                 node = found.nodes[index]
-                own = (node.name, node.part, node.point) == (term.name, part, point)
+                origin = "measured" if (part, point) in node.seen else "mirror"
                 row: dict[str, Any] = {
                     "vehicle": vehicle.name,
                     "coefficient": term.name,
@@ -59,7 +58,7 @@ def database_rows(found: Identification) -> pd.DataFrame:
                     "stderr": abs(sign) * stderr[index],
                     "n_runs": len(set(node.runs)) if sign else 0,
                     "quality": max(node.qualities, key=lambda q: factor[q]) if sign else "",
-                    "origin": _ORIGIN[sign] if own or not sign else "mirror",
+                    "origin": origin if sign else "symmetry",
                     "estimate": index if sign else -1,
                     "worst_residual": node.worst if sign else 0.0,
                     "extrapolation": " ".join(f"{a}:{r}" for a, r in term.extrapolation.items()),

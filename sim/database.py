@@ -27,7 +27,7 @@ COLUMNS = {
     "stderr": "standard error of the value",
     "n_runs": "number of runs behind the value",
     "quality": "worst quality word among those runs",
-    "origin": "measured, mirror (port/starboard image) or symmetry (zero by it)",
+    "origin": "measured, mirror (port/starboard image of a run) or symmetry (zero by it)",
     "estimate": "values with the same number are one estimate",
     "worst_residual": "largest disagreement among the runs, in standard errors",
     "extrapolation": "rule beyond the data, axis by axis",
