@@ -20,7 +20,8 @@ from sim.catalogue import BOAT_FEATURES, PLANE_FEATURES
 HOLD, LINEAR, LINEAR_LOAD = 0, 1, 2
 N_BOAT, N_PLANE = len(BOAT_FEATURES), len(PLANE_FEATURES)
 OUT_DEDUCTION, OUT_THRUST, N_OUT = 6, 7, 8
-MAX_COEFFICIENTS = 16
+# Coefficients a group holds, one a load component: a fixed width unrolls the inner loop.
+WIDTH = 6
 MAX_CORNERS = 32
 MAX_AXES = 128
 
@@ -33,7 +34,7 @@ class Model(NamedTuple):
     sail_top : D0 = z + sail_top [m]; diameter [m]; wake : w_T.
     planes : (planes, 6) position [m] and lift axis of each plane.
     groups : (g, 5) tables that share axes: first link, links, first coefficient,
-        coefficients, first value in ``data`` (coefficients innermost).
+        coefficients, first row in ``data``; data : (rows, WIDTH) grid nodes, coefficients.
     links : (l, 2) axis and stride; axes : (a, 4) feature, rule, first node, nodes.
     terms : (k, 5) output and four factors of each coefficient; scale : (k,) its load scale.
     """
@@ -74,7 +75,7 @@ def workspace(n_planes: int) -> Work:
     """Scratch arrays for a vehicle with ``n_planes`` planes."""
     return Work(
         np.ones(N_BOAT + N_PLANE * n_planes + 1),
-        np.zeros(MAX_COEFFICIENTS),
+        np.zeros(WIDTH),
         np.zeros(N_OUT),
         np.zeros(MAX_CORNERS, dtype=np.int64),
         np.zeros(MAX_CORNERS),
@@ -169,12 +170,12 @@ def loads(m, work):
                 weight[corners + k] = weight[k] * t
                 weight[k] *= 1.0 - t
             corners *= 2
-        for j in range(count):
+        for j in range(WIDTH):
             values[j] = 0.0
         for k in range(corners):
-            share, at = weight[k], place[k]
-            for j in range(count):
-                values[j] += share * m.data[at + j]
+            share, row = weight[k], m.data[place[k]]
+            for j in range(WIDTH):
+                values[j] += share * row[j]
         for j in range(count):
             k = first + j
             product = m.scale[k] * values[j] * f[m.terms[k, 1]] * f[m.terms[k, 2]]

@@ -145,16 +145,17 @@ class _Flat:
             for k, nodes in enumerate(union):
                 grid = _refine(grid, k, member.table.extension[k][0], nodes)
             grids.append(grid)
+        grids += [np.zeros_like(grids[0])] * (kernel.WIDTH - len(grids))
         block = np.stack(grids, axis=-1)
         start = len(self.link)
         for k, (name, nodes) in enumerate(zip(first.term.axes, union, strict=True)):
             if nodes.size > 1:
                 feature, rule = self.feature(name, first.part), _RULES[rules[k]]  # type: ignore[index]
-                stride = int(np.prod(block.shape[k + 1 :]))
+                stride = int(np.prod(block.shape[k + 1 : -1]))
                 self.link.append([self.axis_index(feature, rule, nodes), stride])
         self.group.append([start, len(self.link) - start, len(self.coefficient), len(members), self.size])
-        self.data.append(block.reshape(-1))
-        self.size += block.size
+        self.data.append(block.reshape(-1, kernel.WIDTH))
+        self.size += len(self.data[-1])
         for member in members:
             factors = [self.feature(f, member.part) for f in member.term.factors]
             factors += [self.one] * (MAX_FACTORS - len(factors))
@@ -163,8 +164,8 @@ class _Flat:
 
 
 def _batches(members: list[Coefficient]) -> Iterable[list[Coefficient]]:
-    for i in range(0, len(members), kernel.MAX_COEFFICIENTS):
-        yield members[i : i + kernel.MAX_COEFFICIENTS]
+    for i in range(0, len(members), kernel.WIDTH):
+        yield members[i : i + kernel.WIDTH]
 
 
 def assemble(coefficients: Coefficients, environment: Environment) -> kernel.Model:
@@ -210,7 +211,7 @@ def assemble(coefficients: Coefficients, environment: Environment) -> kernel.Mod
         links=np.array(flat.link, dtype=np.int64).reshape(-1, 2),
         axes=np.array(list(flat.axis.values()), dtype=np.int64).reshape(-1, 4),
         nodes=np.array(flat.nodes, dtype=float),
-        data=np.concatenate(flat.data) if flat.data else np.zeros(0),
+        data=np.concatenate(flat.data) if flat.data else np.zeros((0, kernel.WIDTH)),
         terms=np.array([[k[0], *k[2]] for k in flat.coefficient], dtype=np.int64).reshape(-1, 1 + MAX_FACTORS),
         scale=np.array([k[1] for k in flat.coefficient], dtype=float),
     )

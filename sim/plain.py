@@ -53,7 +53,7 @@ def loads(m: kernel.Model, f: Array) -> Array:
             i, w = _weights(m.nodes[node : node + nodes], rule, f[feature])
             weight = np.multiply.outer(weight, w).reshape(-1)
             place = np.add.outer(place, np.array([i, i + 1]) * stride).reshape(-1)
-        values = weight @ m.data[place[:, None] + np.arange(count)]
+        values = weight @ m.data[place, :count]
         terms = m.terms[first : first + count]
         np.add.at(total, terms[:, 0], m.scale[first : first + count] * values * np.prod(f[terms[:, 1:]], axis=1))
     total[0] += (1.0 - total[kernel.OUT_DEDUCTION]) * total[kernel.OUT_THRUST]
