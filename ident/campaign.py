@@ -6,6 +6,7 @@ table of runs in the program frame, SI and radians, with a standard error for ev
 
 from __future__ import annotations
 
+import csv
 import hashlib
 import tomllib
 from dataclasses import dataclass, field
@@ -28,6 +29,8 @@ REQUIRED = ("run_id", "test", "part", "quality", "source")
 MOTION = ("p", "q", "r", "udot", "vdot", "wdot", "pdot", "qdot", "rdot")
 DIRECT = ("KT", "KQ", "t")
 
+# Larger numbers are slips of the pen, and their powers leave the floating-point range.
+_LARGEST = 1e15
 # Flow beyond 60 deg from the axis is flow across the hull.
 _ACROSS = 0.5
 
@@ -57,14 +60,14 @@ class MomentPoint(_Part):
 class Scale(_Part):
     """Linear scale ratio (ship over model) and the length of the tested body."""
 
-    ratio: Annotated[float, Field(gt=0)]
-    length_m: Annotated[float, Field(gt=0)]
+    ratio: Annotated[float, Field(gt=0, le=1e4)]
+    length_m: Annotated[float, Field(gt=0, le=1e4)]
 
 
 class Fluid(_Part):
     """Water density of the tests."""
 
-    density_kgpm3: Annotated[float, Field(gt=0)]
+    density_kgpm3: Annotated[float, Field(gt=0, le=1e5)]
     source: str
 
 
@@ -84,7 +87,7 @@ class Uncertainty(_Part):
 class Quality(_Part):
     """A word of the quality vocabulary: factor on the standard error, and its meaning."""
 
-    factor: Annotated[float, Field(ge=1)]
+    factor: Annotated[float, Field(ge=1, le=1e6)]
     meaning: str
 
 
@@ -151,10 +154,31 @@ def _read_header(folder: Path) -> tuple[CampaignFile, bytes]:
     raw = path.read_bytes()
     try:
         return CampaignFile.model_validate(tomllib.loads(raw.decode("utf-8"))), raw
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise InputError(str(path), f"not TOML: {error}", "a TOML file in UTF-8") from error
     except ValidationError as error:
         raise explain(str(path), error) from error
+    except (ValueError, RecursionError) as error:
+        raise InputError(str(path), f"not TOML: {error}", "a TOML file in UTF-8") from error
+
+
+def _cells(path: Path) -> pd.DataFrame:
+    """The cells of a CSV file as text, no row longer than the header."""
+    try:
+        with path.open(encoding="utf-8-sig", newline="") as stream:
+            lines = [line for line in csv.reader(stream, strict=True) if line]
+    except (csv.Error, UnicodeDecodeError) as error:
+        raise InputError(str(path), f"not a table: {error}", "comma-separated values in UTF-8") from error
+    if len(lines) < 2:
+        raise InputError(str(path), "no runs", "at least one row below the header")
+    header = [name.strip() for name in lines[0]]
+    for row, line in enumerate(lines[1:], start=2):
+        if len(line) > len(header):
+            raise InputError(f"{path}, row {row}", f"{len(line)} cells", f"at most {len(header)}, as in the header")
+        # Spreadsheets drop blank cells at the end of a row.
+        line += [""] * (len(header) - len(line))
+    for name in header:
+        if header.count(name) > 1:
+            raise InputError(f"{path}, row 1 (header)", f"column {name!r} stands twice", "each column once")
+    return pd.DataFrame(lines[1:], columns=header, dtype=str)
 
 
 def _check_columns(path: Path, table: pd.DataFrame) -> None:
@@ -174,12 +198,17 @@ def _check_columns(path: Path, table: pd.DataFrame) -> None:
 def _numbers(path: Path, table: pd.DataFrame, column: str, factor: float) -> pd.Series:
     text = table[column].str.strip()
     values = pd.to_numeric(text.where(text != ""), errors="coerce").astype(float)
-    bad = (text != "") & ~np.isfinite(values)
+    bad = (text != "") & ~(values.abs() <= _LARGEST)
     if bad.any():
         i = int(np.flatnonzero(bad.to_numpy())[0])
         raise InputError(
-            f"{path}, row {i + 2}, column {column}", repr(table[column].iloc[i]), "a finite number, or blank"
+            f"{path}, row {i + 2}, column {column}",
+            repr(table[column].iloc[i]),
+            f"a finite number of at most {_LARGEST:g}, or blank",
         )
+    if "sigma" in column and (values < 0.0).any():
+        i = int(np.flatnonzero((values < 0.0).to_numpy())[0])
+        raise InputError(f"{path}, row {i + 2}, column {column}", table[column].iloc[i], "zero or more")
     return values * factor
 
 
@@ -204,13 +233,7 @@ def read_runs(path: Path, header: CampaignFile, vehicle: Vehicle) -> pd.DataFram
     InputError
         Naming file, row, column, what was found and what is allowed.
     """
-    try:
-        table = pd.read_csv(path, dtype=str, keep_default_na=False, encoding="utf-8-sig", index_col=False)
-    except (pd.errors.ParserError, pd.errors.EmptyDataError, UnicodeDecodeError) as error:
-        raise InputError(str(path), f"not a table: {error}", "comma-separated values in UTF-8") from error
-    if table.empty:
-        raise InputError(str(path), "no runs", "at least one row below the header")
-    table.columns = [c.strip() for c in table.columns]
+    table = _cells(path)
     _check_columns(path, table)
     out = pd.DataFrame({c: table[c].str.strip() if c in table else "" for c in TEXT}, index=table.index)
     words = {"test": list(tests().index), "part": vehicle.part_names(), "quality": list(header.quality)}
@@ -235,6 +258,11 @@ def _check_complete(path: Path, runs: pd.DataFrame) -> None:
             quantity = "plane" if need == "delta" else need
             if pd.isna(run.get(quantity, np.nan)):
                 raise InputError(f"{place}, column {quantity}", "nothing", f"a number: a {run['test']} run needs it")
+        if not run["run_id"]:
+            raise InputError(f"{place}, column run_id", "nothing", "a name for the run")
+        if run.get("U", np.nan) < 0:
+            text = "zero or more: U is a speed, its direction is in alpha and beta"
+            raise InputError(f"{place}, column U", str(run["U"]), text)
         measured = [o for o in (*OUTPUTS, *DIRECT) if pd.notna(run.get(o, np.nan))]
         if not measured:
             raise InputError(place, "no load and no coefficient", "at least one of X Y Z K M N, KT KQ, t")
@@ -246,8 +274,6 @@ def _check_complete(path: Path, runs: pd.DataFrame) -> None:
             bare = [o for o in measured if pd.isna(run.get(f"s_{o}", np.nan))]
             if bare:
                 raise InputError(f"{place}, column rel_sigma", "nothing", f"a number, or sigma_{bare[0]}_<unit>")
-        elif relative < 0:
-            raise InputError(f"{place}, column rel_sigma", str(relative), "zero or more")
     repeated = runs["run_id"][runs["run_id"].duplicated()]
     if not repeated.empty:
         row = runs.loc[repeated.index[0], "row"]
@@ -352,7 +378,7 @@ def read_campaign(folder: Path) -> Campaign:
     for column in columns:
         if column not in runs:
             runs[column] = np.nan
-    _check_copies(folder, runs)
+    runs["copy_of"] = _originals(folder, runs)
     runs = _to_full_scale(_turn(runs, frame), header.scale.ratio)
     point = header.moment_point
     at = [header.scale.ratio * c for c in frame.vector([point.x_m, point.y_m, point.z_m])]
@@ -360,22 +386,28 @@ def read_campaign(folder: Path) -> Campaign:
     return Campaign(header, vehicle, runs, digests)
 
 
-def _check_copies(folder: Path, runs: pd.DataFrame) -> None:
+def _originals(folder: Path, runs: pd.DataFrame) -> pd.Series:
+    """The run each copy goes back to, through copies of copies; empty for originals."""
     repeated = runs[runs["run_id"].duplicated()]
     if not repeated.empty:
         run = repeated.iloc[0]
-        raise InputError(
-            f"{folder / run['file']}, row {run['row']}, column run_id",
-            repr(run["run_id"]),
-            "each run_id once a campaign",
-        )
-    known = {*runs["run_id"], ""}
-    for _, run in runs[~runs["copy_of"].isin(known)].iterrows():
-        raise InputError(
-            f"{folder / run['file']}, row {run['row']}, column copy_of",
-            repr(run["copy_of"]),
-            "the run_id of another run",
-        )
+        place = f"{folder / run['file']}, row {run['row']}, column run_id"
+        raise InputError(place, repr(run["run_id"]), "each run_id once a campaign")
+    parent = dict(zip(runs["run_id"], runs["copy_of"], strict=True))
+
+    def origin(run: pd.Series) -> str:
+        seen, at = {run["run_id"]}, run["copy_of"]
+        while at:
+            if at not in parent or at in seen:
+                place = f"{folder / run['file']}, row {run['row']}, column copy_of"
+                raise InputError(place, repr(run["copy_of"]), "the run_id of another run, without a circle")
+            seen.add(at)
+            if not parent[at]:
+                return str(at)
+            at = parent[at]
+        return ""
+
+    return runs.apply(origin, axis=1)
 
 
 def find_campaigns(folder: Path) -> list[Path]:

@@ -88,7 +88,7 @@ class Identification:
 
 def _key_point(values: list[float]) -> Point:
     """Axis values that compare equal however they were computed."""
-    return tuple(float(f"{v:.10g}") + 0.0 for v in values)
+    return tuple(float(f"{v:.12g}") + 0.0 for v in values)
 
 
 class _Solver:
@@ -128,6 +128,10 @@ class _Solver:
             return here, 1 if mirror.sign > 0 else 0
         swapped = (self.order[image[:2]], [-x for x in image[2]]) < (self.order[here[:2]], [-x for x in point])
         return (image, mirror.sign) if swapped else (here, 1)
+
+    def place(self, term: Term, features: dict[str, float]) -> Point:
+        """The tabulated point of a term in a state."""
+        return _key_point(axis_values(term, features))
 
     def node(self, key: tuple[str, str, Point]) -> int:
         if key not in self.index:
@@ -195,7 +199,7 @@ class _Solver:
         for term, m in self.active(run, output, features):
             factor = self.scales[term.name] * m
             if run["test"] in term.tests:
-                point = _key_point(axis_values(term, features))
+                point = self.place(term, features)
                 key, sign = self.canonical(term.name, run["part"], point)
                 if sign == 0:
                     zero_by_symmetry = True
@@ -205,6 +209,8 @@ class _Solver:
                 unknowns[node] = unknowns.get(node, 0.0) + sign * factor
             elif run["decoupled"] != "True":
                 row = self.row(term, run["part"], features)
+                if row is None and self.canonical(term.name, run["part"], self.place(term, features))[1] == 0:
+                    continue
                 if row is None:
                     text = f"{term.name} acts on this run but no test identifies it: not subtracted"
                     self.warnings.append((run["run_id"], text))
@@ -219,7 +225,7 @@ class _Solver:
                 text = f"{output} = {value:g} where port/starboard symmetry makes it zero"
                 self.warnings.append((run["run_id"], text))
         elif value != 0.0:
-            self.skip(run, output, "no term of the vehicle's set acts on this load in this state")
+            self.skip(run, output, f"no term that {run['test']} identifies acts on this load in this state")
         return None
 
     def equations(self, run: pd.Series) -> list[Equation]:
@@ -239,7 +245,7 @@ class _Solver:
                 if run["test"] not in term.tests:
                     self.skip(run, output, f"{output} is not taken from a {run['test']} run")
                     continue
-                key, _ = self.canonical(term.name, term.part, _key_point(axis_values(term, features)))
+                key, _ = self.canonical(term.name, term.part, self.place(term, features))
                 sigma, node = float(run[f"s_{output}"]), self.node(key)
                 self.nodes[node].seen.add((term.part, key[2]))
                 equation = Equation(run, output, float(run[output]), sigma, {node: 1.0}, {})

@@ -55,6 +55,9 @@ def gain_matrix(a: Array, weight: Array) -> tuple[Array, list[int]]:
         r, c = np.flatnonzero(label[:n_rows] == block), np.flatnonzero(label[n_rows:] == block)
         local = a[np.ix_(r, c)] * weight[r, None]
         size = np.linalg.norm(local, axis=0)
+        if not (np.isfinite(local).all() and np.all(size > 0.0)):
+            lost += [int(k) for k in c]
+            continue
         u, s, vt = np.linalg.svd(local / size, full_matrices=False)
         good = s > _RANK * s[0]
         if good.sum() < c.size:

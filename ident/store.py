@@ -72,12 +72,18 @@ def database_rows(found: Identification) -> pd.DataFrame:
     if not rows:
         raise InputError(found.campaign.header.name, "the runs identify nothing", "runs of at least one known test")
     table = pd.DataFrame(rows).reindex(columns=column_order())
-    finite = np.isfinite(table[list(NUMBERS)].to_numpy(dtype=float)).all(axis=1)
-    if not finite.all():
-        bad = table[~finite].iloc[0]
-        text = f"{bad['coefficient']} of {bad['part']} is not finite"
-        raise InputError(found.campaign.header.name, text, "loads and errors of a size the arithmetic holds")
+    _check_finite(table, found.campaign.header.name)
     return table
+
+
+def _check_finite(rows: pd.DataFrame, where: str) -> None:
+    """Refuse values, errors or axis values that are not finite (axes may be empty)."""
+    finite = np.isfinite(rows[list(NUMBERS)].to_numpy(dtype=float)).all(axis=1)
+    finite &= ~np.isinf(rows[list(axis_columns())].to_numpy(dtype=float)).any(axis=1)
+    if not finite.all():
+        bad = rows[~finite].iloc[0]
+        text = f"{bad['coefficient']} of {bad['part']} is not finite"
+        raise InputError(where, text, "loads and errors of a size the arithmetic holds")
 
 
 def digest(rows: pd.DataFrame) -> str:
@@ -118,12 +124,27 @@ def commit(path: str, rows: pd.DataFrame, metadata: dict[str, str]) -> tuple[int
     InputError
         When the path cannot hold a database, or another fit committed at the same time.
     """
+    _check_finite(rows, path)
+    local = Path(path)
+    if "://" in path:
+        return _commit(path, rows, metadata)
+    from filelock import FileLock
+
+    if local.exists() and not local.is_dir():
+        raise InputError(path, "a file", "a folder for the database")
+    try:
+        local.mkdir(parents=True, exist_ok=True)
+        # Creating a table is not exclusive in Delta Lake; the lock falls with its process.
+        with FileLock(local / ".lock"):
+            return _commit(path, rows, metadata)
+    except OSError as error:
+        raise InputError(path, f"cannot be written: {error}", "a folder you may write to") from error
+
+
+def _commit(path: str, rows: pd.DataFrame, metadata: dict[str, str]) -> tuple[int, bool]:
     from deltalake import CommitProperties, write_deltalake
     from deltalake.exceptions import CommitFailedError, DeltaError
 
-    local = Path(path)
-    if "://" not in path and local.exists() and not local.is_dir():
-        raise InputError(path, "a file", "a folder for the database")
     content, vehicle = digest(rows), str(rows["vehicle"].iloc[0])
     for attempt in range(_TRIES):
         parent, number = _latest(path, vehicle, content)
@@ -133,7 +154,7 @@ def commit(path: str, rows: pd.DataFrame, metadata: dict[str, str]) -> tuple[int
         properties = CommitProperties(custom_metadata={**metadata, **own})
         try:
             if parent:
-                replaced = f"vehicle = '{vehicle}'"
+                replaced = "vehicle = '" + vehicle.replace("'", "''") + "'"
                 write_deltalake(
                     path,
                     _arrow(rows),
@@ -144,13 +165,15 @@ def commit(path: str, rows: pd.DataFrame, metadata: dict[str, str]) -> tuple[int
                 )
             else:
                 write_deltalake(path, _arrow(rows), mode="error", commit_properties=properties)
-        except (CommitFailedError, DeltaError) as error:
+        except CommitFailedError as error:
             # Another fit committed in between: look again, then give up.
             if attempt == _TRIES - 1:
                 raise InputError(path, f"another fit wrote at the same time: {error}", "run the fit again") from error
             continue
-        except OSError as error:
-            raise InputError(path, f"cannot be written: {error}", "a folder you may write to") from error
+        except DeltaError as error:
+            raise InputError(
+                path, f"the database refused the version: {error}", "a database `ident fit` wrote"
+            ) from error
         return _own_version(path, content), True
     raise AssertionError("unreachable: the last try returns or raises")
 

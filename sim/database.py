@@ -34,6 +34,8 @@ COLUMNS = {
     "equation": "equations of the source",
     "runs": "run ids behind the value",
 }
+# How often a history that a commit overtook is read again.
+_LOOKS = 5
 NUMBERS = ("value", "stderr", "worst_residual")
 COUNTS = ("n_runs", "estimate")
 
@@ -114,9 +116,16 @@ def read_rows(path: str, version: int | None = None, vehicle: str | None = None)
     InputError
         When database, version or vehicle do not exist.
     """
+    from deltalake.exceptions import DeltaError
+
     table = open_table(path, version)
     # A version written before an axis existed has no column for it.
-    rows = table.to_pyarrow_table().to_pandas().reindex(columns=column_order())
+    try:
+        rows = table.to_pyarrow_table().to_pandas().reindex(columns=column_order())
+    except (OSError, DeltaError) as error:
+        raise InputError(
+            path, f"version {table.version()} cannot be read: {error}", "all files of the version"
+        ) from error
     if vehicle is not None:
         known = sorted(rows["vehicle"].unique())
         rows = rows[rows["vehicle"] == vehicle]
@@ -128,9 +137,15 @@ def read_rows(path: str, version: int | None = None, vehicle: str | None = None)
 
 def versions(path: str) -> list[Version]:
     """Every version of a database, oldest first. Raises ``InputError`` when there is none."""
-    table = open_table(path)
+    entries: list[dict[str, Any]] = []
+    for _ in range(_LOOKS):
+        table = open_table(path)
+        entries = table.history()
+        # A commit between the two calls shifts the numbers of the history.
+        if entries and max(int(e["version"]) for e in entries) == table.version() >= 0:
+            break
     found = []
-    for entry in table.history():
+    for entry in entries:
         metadata = {k: str(v) for k, v in entry.items() if k not in ("version", "timestamp")}
         stamp = entry.get("timestamp", "")
         found.append(Version(int(entry["version"]), str(stamp), metadata))

@@ -184,11 +184,17 @@ def read_toml(name: str | Path, kind: str) -> tuple[dict[str, Any], str]:
     path = Path(name)
     if path.suffix != ".toml" and str(name) in bundled(kind):
         return tomllib.loads((files("sim") / kind / f"{name}.toml").read_text("utf-8")), str(name)
-    if not path.is_file():
-        raise InputError(str(name), "no such file or bundled name", f"one of {', '.join(bundled(kind))}, or a path")
+    try:
+        there = path.is_file()
+    except OSError:
+        there = False
+    if not there:
+        raise InputError(
+            str(name)[:200], "no such file or bundled name", f"one of {', '.join(bundled(kind))}, or a path"
+        )
     try:
         return tomllib.loads(path.read_text("utf-8")), str(path)
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except (ValueError, RecursionError) as error:
         raise InputError(str(path), f"not TOML: {error}", "a TOML file in UTF-8") from error
 
 
