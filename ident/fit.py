@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from ident.campaign import Campaign, find_campaigns, read_campaign
 from ident.identify import Identification, identify
 from ident.store import commit, database_rows, digest
+from sim.errors import InputError
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -87,13 +88,19 @@ def fit(folder: Path, db: str, message: str = "") -> list[Fit]:
     Raises
     ------
     sim.errors.InputError
-        For bad input; nothing is committed for the campaign that has it.
+        For bad input in any campaign, before anything is committed.
     """
-    read = [read_campaign(path) for path in find_campaigns(folder)]
+    paths = find_campaigns(folder)
+    read = [read_campaign(path) for path in paths]
+    names = [campaign.vehicle.name for campaign in read]
+    for path, name in zip(paths, names, strict=True):
+        if names.count(name) > 1:
+            text = "one campaign a vehicle: a version replaces all rows of its vehicle"
+            raise InputError(str(path / "campaign.toml"), f"vehicle {name!r} has {names.count(name)} campaigns", text)
+    identified = [(campaign, identify(campaign)) for campaign in read]
+    ready = [(campaign, found, database_rows(found)) for campaign, found in identified]
     done = []
-    for campaign in read:
-        found = identify(campaign)
-        rows = database_rows(found)
+    for campaign, found, rows in ready:
         version, new = commit(db, rows, metadata(campaign, found, message))
         done.append(Fit(campaign, found, rows, version, new, digest(rows)))
     return done

@@ -31,6 +31,9 @@ from sim.tables import Table
 Array = NDArray[np.float64]
 Key = tuple[str, str]
 
+# Relative to the length: levers closer than this are the same lever, rounded.
+_LEVER_DIGITS = 1e-5
+
 
 @dataclass
 class Node:
@@ -363,6 +366,20 @@ def _error_covariance(equations: list[Equation], sigma: Array) -> Array:
     return covariance
 
 
+def _check_levers(solver: _Solver) -> None:
+    """Warn where a section's lever in the runs is not the vehicle file's."""
+    runs, sections = solver.campaign.runs, solver.vehicle.sections
+    if sections is None or not {"x", "y", "z"} <= set(runs):
+        return
+    tolerance = _LEVER_DIGITS * solver.vehicle.particulars.length.value
+    for section in sections.centres:
+        levers = runs.loc[runs["part"] == section.name, ["x", "y", "z"]].dropna()
+        off = (levers - section.position).abs().max(axis=1)
+        for i in off.index[off > tolerance]:
+            text = f"lever of {section.name} differs from the vehicle file's by {off[i]:.3g} m; the file's is used"
+            solver.warnings.append((str(runs.loc[i, "run_id"]), text))
+
+
 def _propulsion_point(solver: _Solver, runs: pd.DataFrame) -> None:
     """The wake fraction from the first self-propulsion run that gives revolutions."""
     speeds = runs[(runs["test"] == "self_propulsion") & runs["n"].notna()]
@@ -395,6 +412,7 @@ def identify(campaign: Campaign) -> Identification:
     Identification; runs that could not be used are listed with the reason.
     """
     solver = _Solver(campaign)
+    _check_levers(solver)
     stages = tests()["stage"]
     for stage in sorted(stages.unique()):
         runs = campaign.runs[campaign.runs["test"].map(stages) == stage]

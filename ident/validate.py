@@ -200,15 +200,14 @@ def validate(name: str, db: str, version: int | None = None) -> Validation:
     errors = _errors(case, simulation, reference)
     outside, constant = _outside(simulation, coefficients)
     record = next(v for v in versions(db) if v.number == number)
-    finite = bool(np.isfinite(simulation.record).all())
-    complete = finite and simulation["t"][-1] >= case.run.duration_s - case.run.record_s
+    complete = simulation["t"][-1] >= case.run.duration_s - case.run.record_s
     result = {
         "case": case.name,
         "database": {"path": db, "version": number, "digest": record.digest},
         "references": errors,
         "metrics": _metrics(case, simulation, reference),
         "outside_tables": outside,
-        "passed": complete and _passed(case, errors),
+        "passed": bool(complete and _passed(case, errors)),
     }
     return Validation(case, simulation, reference, result, constant)
 
@@ -242,6 +241,9 @@ def show(done: Validation, console: Console) -> None:
             table.add_row(metric, *[_number(values[c]) for c in labels])
         console.print(table)
     _show_outside(done, console)
+    end = float(done.simulation["t"][-1])
+    if end < done.case.run.duration_s - done.case.run.record_s:
+        console.print(f"[red]the simulation left the finite numbers after {end:.1f} s; errors are up to there[/]")
     if float(done.simulation["D0"].min()) < 0.0:
         console.print("[red]the sail top left the water; the model holds for a fully submerged boat only[/]")
     verdict = "[green]within[/]" if result["passed"] else "[red]outside[/]"

@@ -206,11 +206,12 @@ def fly(model, settings, y0, c0, dt: float, steps: int, every: int):
 
     Returns
     -------
-    record : (rows, 15 + planes + 1) as in ``run``.
+    record : (rows, 15 + planes + 1) as in ``run``, up to the last finite row.
     executes : (k, 2) time [s] and command [rad] of each zigzag execute.
     """
     record = np.zeros((steps // every + 1, 15 + c0.size))
     executes = np.zeros((256, 2))
     work = workspace(c0.size - 1)
     rows, events = run(model, settings, y0, c0, dt, steps, every, work, record, executes)
-    return record[:rows], executes[: min(events, len(executes))]
+    flown = record[:rows]
+    return flown[np.isfinite(flown).all(axis=1)], executes[: min(events, len(executes))]

@@ -10,9 +10,10 @@ standard error follows from the same weights.
   nearest runs; this is the source's superposition X'(alpha) + X'(beta).
 * Beyond the points, per axis: ``hold``; ``linear`` (the coefficient goes on straight);
   ``linear_load`` (coefficient times axis goes on straight away from zero, so the coefficient
-  tends to a constant); ``drift_odd`` and ``drift_even``: Eq. (25) matched in value and slope at the
-  last run, C0 cos^2 + A sin cos + B sin|sin| for in-plane loads, A cos^2 + B sin^2 for
-  out-of-plane loads, up to 90 deg; ``absent`` (for a sign axis): zero on a side no run has.
+  tends to a constant); ``drift_odd`` and ``drift_even``: the forms of Eq. (25), up to 90 deg.
+  In-plane loads, C0 cos^2 + A sin cos + B sin|sin| through all runs of the side, moved to pass
+  through the last; out-of-plane loads, A cos^2 + B sin^2 with value and slope of the last two;
+  ``absent`` (for a sign axis): zero on a side no run has.
 """
 
 from __future__ import annotations
@@ -62,25 +63,41 @@ def axis_weights(nodes: Array, rule: str, x: float) -> Array:
     return weights
 
 
-def _drift_row(nodes: Array, rule: str, x: float) -> Array:
-    """Weights of the nodes for Eq. (25) continued to ``x`` beyond the last node."""
+def _odd_row(nodes: Array, x: float) -> Array:
+    """Weights of the nodes for the value at ``x`` of an in-plane load, Eq. (25).
+
+    C0 cos^2 + A sin cos + B sin|sin| by least squares through the runs on the side of
+    ``x``, moved to pass through the last of them.
+    """
+
+    def lift_and_drag(angle: float) -> Array:
+        return np.array([0.5 * np.sin(2.0 * angle), np.sin(angle) * abs(np.sin(angle))])
+
+    side = np.flatnonzero(nodes * np.sign(x) > 0.0)
+    edge = side[-1] if x > 0.0 else side[0]
+    last, centre = np.eye(nodes.size)[edge], axis_weights(nodes, "hold", 0.0)
+    beyond, at_edge = lift_and_drag(x), lift_and_drag(nodes[edge])
+    if side.size == 1:
+        # One run determines the lift only.
+        return centre + beyond[0] / at_edge[0] * (last - centre)
+    form = np.array([lift_and_drag(a) for a in nodes[side]])
+    rest = np.eye(nodes.size)[side] - np.outer(np.cos(nodes[side]) ** 2, centre)
+    fitted = (beyond - at_edge) @ np.linalg.pinv(form) @ rest
+    return last + (np.cos(x) ** 2 - np.cos(nodes[edge]) ** 2) * centre + fitted
+
+
+def _even_row(nodes: Array, x: float) -> Array:
+    """Weights of the nodes for the value at ``x`` of an out-of-plane load.
+
+    A cos^2 + B sin^2 with the value and the slope of the last two runs.
+    """
     edge, inner = (-1, -2) if x > 0 else (0, 1)
     e = nodes[edge]
-    slope = np.zeros(nodes.size)
-    slope[edge], slope[inner] = 1.0, -1.0
-    slope /= e - nodes[inner]
-    value = np.zeros(nodes.size)
+    value, slope = np.zeros(nodes.size), np.zeros(nodes.size)
     value[edge] = 1.0
-    s2 = np.sin(2.0 * e)
-    if rule == "drift_even":
-        basis = np.array([[np.cos(e) ** 2, np.sin(e) ** 2], [-s2, s2]])
-        at_x = np.array([np.cos(x) ** 2, np.sin(x) ** 2])
-        return at_x @ np.linalg.solve(basis, np.stack([value, slope]))
-    centre = axis_weights(nodes, "hold", 0.0)
-    basis = np.array([[0.5 * s2, np.sin(e) * abs(np.sin(e))], [np.cos(2.0 * e), abs(s2)]])
-    rest = np.stack([value - np.cos(e) ** 2 * centre, slope + s2 * centre])
-    at_x = np.array([0.5 * np.sin(2.0 * x), np.sin(x) * abs(np.sin(x))])
-    return np.cos(x) ** 2 * centre + at_x @ np.linalg.solve(basis, rest)
+    slope[edge], slope[inner] = 1.0 / (e - nodes[inner]), -1.0 / (e - nodes[inner])
+    basis = np.array([[np.cos(e) ** 2, np.sin(e) ** 2], [-np.sin(2.0 * e), np.sin(2.0 * e)]])
+    return np.array([np.cos(x) ** 2, np.sin(x) ** 2]) @ np.linalg.solve(basis, np.stack([value, slope]))
 
 
 def extend_axis(nodes: Array, rule: str) -> tuple[Array, Array]:
@@ -108,14 +125,15 @@ def extend_axis(nodes: Array, rule: str) -> tuple[Array, Array]:
     ):
         if edge <= 0.0:
             continue
-        fine = np.arange(edge + step, _FINE_TO + 0.5 * step, step)
-        last = fine[-1] if fine.size else edge
+        fine = edge + step * np.arange(1, int(np.ceil((_FINE_TO - edge) / step - 1e-9)) + 1)
+        last = fine[-1]
         extra += list(sign * fine) + [sign * c for c in _COARSE if c > last]
     extended = np.sort(np.concatenate([nodes, extra]))
     matrix = np.zeros((extended.size, nodes.size))
     for row, x in zip(matrix, extended, strict=True):
         inside = nodes[0] <= x <= nodes[-1]
-        row[:] = axis_weights(nodes, "hold", x) if inside else _drift_row(nodes, rule, x)
+        beyond = _odd_row if rule == "drift_odd" else _even_row
+        row[:] = axis_weights(nodes, "hold", x) if inside else beyond(nodes, x)
     return extended, matrix
 
 
