@@ -66,7 +66,7 @@ def fitted(folder: Path):
     return database_rows(identify(read_campaign(folder)))
 
 
-def refused(folder: Path, *words: str) -> InputError:
+def assert_refused(folder: Path, *words: str) -> InputError:
     """The InputError of reading and fitting ``folder``; its message holds every word."""
     with pytest.raises(InputError) as caught:
         fitted(folder)
@@ -87,12 +87,12 @@ def test_the_small_campaign_itself_is_accepted(tmp_path):
 
 
 def test_missing_campaign_file_is_named(tmp_path):
-    refused(tmp_path, "campaign.toml", "missing")
+    assert_refused(tmp_path, "campaign.toml", "missing")
 
 
 def test_missing_run_file_is_named(tmp_path):
     (tmp_path / "campaign.toml").write_text(HEADER)
-    refused(tmp_path, str(tmp_path), "no CSV")
+    assert_refused(tmp_path, str(tmp_path), "no CSV")
 
 
 def test_folder_without_campaign_is_named(tmp_path):
@@ -106,52 +106,54 @@ def test_folder_without_campaign_is_named(tmp_path):
 def test_undeclared_section_is_named(tmp_path, key):
     head, rest = HEADER.split(key)
     following = rest[rest.index("\n[") + 1 :]
-    refused(write(tmp_path, head + following), "campaign.toml", key.strip("[]"), "nothing")
+    assert_refused(write(tmp_path, head + following), "campaign.toml", key.strip("[]"), "nothing")
 
 
 @pytest.mark.parametrize("axis", ["x", "y", "z"])
 def test_frame_axis_that_is_not_declared_is_named(tmp_path, axis):
     line = next(k for k in HEADER.splitlines() if k.startswith(f"{axis} = "))
-    refused(write(tmp_path, HEADER.replace(line + "\n", "")), "campaign.toml", f"frame.{axis}", "nothing")
+    assert_refused(write(tmp_path, HEADER.replace(line + "\n", "")), "campaign.toml", f"frame.{axis}", "nothing")
 
 
 def test_left_handed_frame_is_refused(tmp_path):
-    refused(write(tmp_path, HEADER.replace('"starboard"', '"port"')), "campaign.toml", "[frame]", "left-handed")
+    assert_refused(write(tmp_path, HEADER.replace('"starboard"', '"port"')), "campaign.toml", "[frame]", "left-handed")
 
 
 def test_unknown_frame_direction_lists_the_directions(tmp_path):
-    refused(write(tmp_path, HEADER.replace('"aft"', '"astern"')), "campaign.toml", "astern", "forward", "aft")
+    assert_refused(write(tmp_path, HEADER.replace('"aft"', '"astern"')), "campaign.toml", "astern", "forward", "aft")
 
 
 def test_unknown_angle_convention_is_refused(tmp_path):
-    refused(write(tmp_path, HEADER.replace('"flight"', '"ittc"')), "campaign.toml", "frame.angles", "ittc", "flight")
+    assert_refused(
+        write(tmp_path, HEADER.replace('"flight"', '"ittc"')), "campaign.toml", "frame.angles", "ittc", "flight"
+    )
 
 
 def test_model_inertia_in_the_loads_is_refused(tmp_path):
     text = HEADER.replace("model_inertia_in_loads = false", "model_inertia_in_loads = true")
-    refused(write(tmp_path, text), "campaign.toml", "model_inertia_in_loads", "True")
+    assert_refused(write(tmp_path, text), "campaign.toml", "model_inertia_in_loads", "True")
 
 
 def test_unknown_key_is_named(tmp_path):
-    refused(write(tmp_path, 'colour = "red"\n' + HEADER), "campaign.toml", "colour", "red")
+    assert_refused(write(tmp_path, 'colour = "red"\n' + HEADER), "campaign.toml", "colour", "red")
 
 
 @pytest.mark.parametrize("value", ["0.0", "-1.0", "inf", "nan", '"one"'])
 def test_scale_ratio_out_of_range_is_refused(tmp_path, value):
-    refused(write(tmp_path, HEADER.replace("ratio = 1.0", f"ratio = {value}")), "campaign.toml", "scale.ratio")
+    assert_refused(write(tmp_path, HEADER.replace("ratio = 1.0", f"ratio = {value}")), "campaign.toml", "scale.ratio")
 
 
 def test_toml_syntax_error_names_the_line(tmp_path):
-    refused(write(tmp_path, HEADER.replace("[frame]", "[frame")), "campaign.toml", "not TOML", "line 5")
+    assert_refused(write(tmp_path, HEADER.replace("[frame]", "[frame")), "campaign.toml", "not TOML", "line 5")
 
 
 def test_campaign_file_in_another_encoding_is_refused(tmp_path):
-    refused(write(tmp_path, HEADER.replace("made up", "caf\xe9").encode("latin-1")), "campaign.toml", "UTF-8")
+    assert_refused(write(tmp_path, HEADER.replace("made up", "caf\xe9").encode("latin-1")), "campaign.toml", "UTF-8")
 
 
 @pytest.mark.parametrize("name", ["nautilus", "absent.toml", "", "b" * 300 + ".toml"])
 def test_unknown_vehicle_is_named(tmp_path, name):
-    refused(write(tmp_path, HEADER.replace('vehicle = "bb2"', f'vehicle = "{name}"')), name[:20], "bb2")
+    assert_refused(write(tmp_path, HEADER.replace('vehicle = "bb2"', f'vehicle = "{name}"')), name[:20], "bb2")
 
 
 # -- the run files ------------------------------------------------------------------------
@@ -159,48 +161,52 @@ def test_unknown_vehicle_is_named(tmp_path, name):
 
 @pytest.mark.parametrize("column", ["run_id", "test", "part", "quality", "source"])
 def test_missing_column_is_named(tmp_path, column):
-    refused(write(tmp_path, runs=RUNS.replace(column, "exclude_me", 1).replace("exclude_me,", "reason,")), column)
+    assert_refused(
+        write(tmp_path, runs=RUNS.replace(column, "exclude_me", 1).replace("exclude_me,", "reason,")), column
+    )
 
 
 @pytest.mark.parametrize(("column", "wrong"), [("X_N", "X_lbf"), ("U_mps", "U_mph"), ("alpha_deg", "alpha_grad")])
 def test_unknown_unit_lists_the_units(tmp_path, column, wrong):
-    refused(write(tmp_path, runs=RUNS.replace(column, wrong)), "drift.csv", "row 1", wrong, column)
+    assert_refused(write(tmp_path, runs=RUNS.replace(column, wrong)), "drift.csv", "row 1", wrong, column)
 
 
 def test_unknown_column_is_named(tmp_path):
-    refused(write(tmp_path, runs=RUNS.replace("source", "colour", 1)), "drift.csv", "source")
-    refused(write(tmp_path, runs=RUNS.replace("exclude", "colour", 1)), "drift.csv", "row 1", "colour")
+    assert_refused(write(tmp_path, runs=RUNS.replace("source", "colour", 1)), "drift.csv", "source")
+    assert_refused(write(tmp_path, runs=RUNS.replace("exclude", "colour", 1)), "drift.csv", "row 1", "colour")
 
 
 def test_quantity_in_two_units_is_refused(tmp_path):
     text = RUNS.replace("copy_of", "U_kts")
-    refused(write(tmp_path, runs=text), "drift.csv", "row 1", "U stands twice")
+    assert_refused(write(tmp_path, runs=text), "drift.csv", "row 1", "U stands twice")
 
 
 @pytest.mark.parametrize("twin", ["U_mps", " U_mps", "source", " source"])
 def test_column_that_stands_twice_is_refused(tmp_path, twin):
-    refused(write(tmp_path, runs=RUNS.replace("copy_of", twin)), "drift.csv", "row 1", twin.strip())
+    assert_refused(write(tmp_path, runs=RUNS.replace("copy_of", twin)), "drift.csv", "row 1", twin.strip())
 
 
 def test_unknown_test_lists_the_tests(tmp_path):
     text = RUNS.replace("h4,drift_horizontal", "h4,drift_sideways")
-    refused(write(tmp_path, runs=text), "drift.csv", "row 3", "column test", "drift_sideways", "drift_horizontal")
+    assert_refused(
+        write(tmp_path, runs=text), "drift.csv", "row 3", "column test", "drift_sideways", "drift_horizontal"
+    )
 
 
 def test_unknown_part_lists_the_parts(tmp_path):
     text = RUNS.replace("h8,drift_horizontal,hull", "h8,drift_horizontal,rudder")
-    refused(write(tmp_path, runs=text), "drift.csv", "row 4", "column part", "rudder", "stern_plane_1")
+    assert_refused(write(tmp_path, runs=text), "drift.csv", "row 4", "column part", "rudder", "stern_plane_1")
 
 
 def test_unknown_quality_lists_the_words(tmp_path):
     text = RUNS.replace("as_published", "good", 1)
-    refused(write(tmp_path, runs=text), "drift.csv", "row 2", "column quality", "good", "as_published")
+    assert_refused(write(tmp_path, runs=text), "drift.csv", "row 2", "column quality", "good", "as_published")
 
 
 @pytest.mark.parametrize("wrong", ["abc", "nan", "inf", "-inf", "1,5", "1e999", "NA", "0x10", "5 m/s", "--5"])
 def test_what_is_not_a_finite_number_is_named(tmp_path, wrong):
     text = RUNS.replace("74000", f'"{wrong}"')
-    refused(write(tmp_path, runs=text), "drift.csv", "row 3", "column X_N", wrong, "finite number")
+    assert_refused(write(tmp_path, runs=text), "drift.csv", "row 3", "column X_N", wrong, "finite number")
 
 
 @pytest.mark.parametrize("row", [2, 3, 4])
@@ -211,62 +217,62 @@ def test_blank_required_quantity_is_named(tmp_path, row, column):
     place = next(i for i, c in enumerate(lines[0].split(",")) if c.split("_")[0] == column)
     cells[place] = ""
     lines[row - 1] = ",".join(cells)
-    refused(write(tmp_path, runs="\n".join(lines)), "drift.csv", f"row {row}", f"column {column}", "nothing")
+    assert_refused(write(tmp_path, runs="\n".join(lines)), "drift.csv", f"row {row}", f"column {column}", "nothing")
 
 
 def test_run_without_any_load_is_named(tmp_path):
-    refused(write(tmp_path, runs=RUNS.replace("74000,-336000", ",")), "drift.csv", "row 3", "no load")
+    assert_refused(write(tmp_path, runs=RUNS.replace("74000,-336000", ",")), "drift.csv", "row 3", "no load")
 
 
 def test_run_without_any_error_is_named(tmp_path):
     text = RUNS.replace("-336000,0.05", "-336000,")
-    refused(write(tmp_path, runs=text), "drift.csv", "row 3", "rel_sigma", "sigma_X_")
+    assert_refused(write(tmp_path, runs=text), "drift.csv", "row 3", "rel_sigma", "sigma_X_")
 
 
 def test_negative_rel_sigma_is_named(tmp_path):
     text = RUNS.replace("-336000,0.05", "-336000,-0.05")
-    refused(write(tmp_path, runs=text), "drift.csv", "row 3", "rel_sigma", "-0.05", "zero or more")
+    assert_refused(write(tmp_path, runs=text), "drift.csv", "row 3", "rel_sigma", "-0.05", "zero or more")
 
 
 def test_negative_sigma_of_a_load_is_named(tmp_path):
     text = RUNS.replace("copy_of", "sigma_X_N").replace("book,,", "book,-100,")
-    refused(write(tmp_path, runs=text), "drift.csv", "row 2", "sigma_X_N", "-100")
+    assert_refused(write(tmp_path, runs=text), "drift.csv", "row 2", "sigma_X_N", "-100")
 
 
 def test_negative_speed_is_named(tmp_path):
     """U is a speed: a source frame with u < 0 ahead would turn the boat around in silence."""
-    refused(write(tmp_path, runs=RUNS.replace("5.0,0,4", "-5.0,0,4")), "drift.csv", "row 3", "column U", "-5")
+    assert_refused(write(tmp_path, runs=RUNS.replace("5.0,0,4", "-5.0,0,4")), "drift.csv", "row 3", "column U", "-5")
 
 
 def test_duplicate_run_is_named_within_and_across_files(tmp_path):
-    refused(write(tmp_path / "a", runs=RUNS.replace("h8", "h4")), "drift.csv", "row 4", "column run_id", "h4")
+    assert_refused(write(tmp_path / "a", runs=RUNS.replace("h8", "h4")), "drift.csv", "row 4", "column run_id", "h4")
     folder = write(tmp_path / "b")
     (folder / "more.csv").write_text(RUNS)
-    refused(folder, "more.csv", "row 2", "column run_id", "h0")
+    assert_refused(folder, "more.csv", "row 2", "column run_id", "h0")
 
 
 def test_blank_run_id_is_named(tmp_path):
-    refused(write(tmp_path, runs=RUNS.replace("\nh4,", "\n,")), "drift.csv", "row 3", "column run_id")
+    assert_refused(write(tmp_path, runs=RUNS.replace("\nh4,", "\n,")), "drift.csv", "row 3", "column run_id")
 
 
 def test_copy_of_a_run_that_does_not_exist_is_named(tmp_path):
     text = RUNS.replace("-336000,0.05,as_published,book,,", "-336000,0.05,as_published,book,h9,")
-    refused(write(tmp_path, runs=text), "drift.csv", "row 3", "column copy_of", "h9")
+    assert_refused(write(tmp_path, runs=text), "drift.csv", "row 3", "column copy_of", "h9")
 
 
 def test_exclusion_of_an_unknown_load_is_named(tmp_path):
     text = RUNS.replace("-336000,0.05,as_published,book,,", "-336000,0.05,as_published,book,,X W")
-    refused(write(tmp_path, runs=text), "drift.csv", "row 3", "column exclude", "W", "X, Y")
+    assert_refused(write(tmp_path, runs=text), "drift.csv", "row 3", "column exclude", "W", "X, Y")
 
 
 @pytest.mark.parametrize("text", ["", "\n", RUNS.splitlines()[0] + "\n", "\ufeff"])
 def test_empty_run_file_is_named(tmp_path, text):
-    refused(write(tmp_path, runs=text), "drift.csv")
+    assert_refused(write(tmp_path, runs=text), "drift.csv")
 
 
 @pytest.mark.parametrize("encoding", ["utf-16", "latin-1"])
 def test_run_file_in_another_encoding_is_named(tmp_path, encoding):
-    refused(write(tmp_path, runs=RUNS.replace("book", "caf\xe9").encode(encoding)), "drift.csv", "UTF-8")
+    assert_refused(write(tmp_path, runs=RUNS.replace("book", "caf\xe9").encode(encoding)), "drift.csv", "UTF-8")
 
 
 def test_spreadsheet_byte_order_mark_and_line_ends_are_accepted(tmp_path):
@@ -282,26 +288,30 @@ def test_row_with_a_cell_too_many_is_refused(tmp_path, which):
     lines[which] = [line + ",9" for line in lines[which]]
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        refused(write(tmp_path, runs="\n".join(lines)), "drift.csv")
+        assert_refused(write(tmp_path, runs="\n".join(lines)), "drift.csv")
 
 
 def test_row_with_cells_missing_is_refused_or_read_as_blank(tmp_path):
     whole = fitted(write(tmp_path / "whole"))
     short = RUNS.replace("-629000,0.05,as_published,book,,", "-629000,0.05,as_published,book")
     assert fitted(write(tmp_path / "short", runs=short)).equals(whole)
-    refused(write(tmp_path / "cut", runs=RUNS.replace(",0.05,as_published,book,,\nh8", "\nh8")), "drift.csv", "row 3")
+    assert_refused(
+        write(tmp_path / "cut", runs=RUNS.replace(",0.05,as_published,book,,\nh8", "\nh8")), "drift.csv", "row 3"
+    )
 
 
 def test_moment_that_cannot_be_moved_for_want_of_a_force_is_named(tmp_path):
     """M_O = M_P + r_P x F needs the forces; a blank one is not zero."""
     runs = RUNS.replace("Y_N", "N_Nm")
     assert len(fitted(write(tmp_path / "origin", runs=runs)))
-    refused(write(tmp_path / "moved", HEADER.replace("x_m = 0.0", "x_m = 2.0"), runs), "drift.csv", "row 2", "column Y")
+    assert_refused(
+        write(tmp_path / "moved", HEADER.replace("x_m = 0.0", "x_m = 2.0"), runs), "drift.csv", "row 2", "column Y"
+    )
 
 
 def test_runs_that_identify_nothing_are_refused(tmp_path):
     text = RUNS.replace("book,,", "book,,X Y")
-    refused(write(tmp_path, runs=text), "small", "identify nothing")
+    assert_refused(write(tmp_path, runs=text), "small", "identify nothing")
 
 
 # -- the database -------------------------------------------------------------------------
@@ -399,7 +409,7 @@ def mutations(draw, text: bytes):
     return text
 
 
-def accepted_or_refused(folder: Path) -> None:
+def assert_accepted_or_refused(folder: Path) -> None:
     """The reader accepts or raises InputError; what it accepts gives a finite database."""
     with warnings.catch_warnings(), np.errstate(all="ignore"):
         warnings.simplefilter("ignore")
@@ -416,13 +426,13 @@ EVERYTHING = settings(max_examples=200, deadline=None, suppress_health_check=[He
 @EVERYTHING
 @given(runs=mutations(RUNS.encode()))
 def test_any_mutation_of_a_run_file_is_accepted_or_refused(tmp_path, runs):
-    accepted_or_refused(write(tmp_path, runs=runs))
+    assert_accepted_or_refused(write(tmp_path, runs=runs))
 
 
 @EVERYTHING
 @given(header=mutations(HEADER.encode()))
 def test_any_mutation_of_the_campaign_file_is_accepted_or_refused(tmp_path, header):
-    accepted_or_refused(write(tmp_path, header=header))
+    assert_accepted_or_refused(write(tmp_path, header=header))
 
 
 HUGE = st.sampled_from(["1e300", "-1e300", "1e308", "1e-300", "1e-320", "1e155", "-1e155", "0", "1e16"])
@@ -436,14 +446,14 @@ def test_huge_and_tiny_numbers_never_give_a_database_that_is_not_finite(tmp_path
     lines = [line.split(",") for line in RUNS.splitlines()]
     for column in columns:
         lines[row][column] = value
-    accepted_or_refused(write(tmp_path, runs="\n".join(",".join(c) for c in lines)))
+    assert_accepted_or_refused(write(tmp_path, runs="\n".join(",".join(c) for c in lines)))
 
 
 @pytest.mark.parametrize("value", ["1e300", "1e-300", "1e200"])
 @pytest.mark.parametrize("key", ["density_kgpm3 = 1025.0", "ratio = 1.0", "length_m = 70.2", "x_m = 0.0"])
 def test_huge_and_tiny_header_numbers_never_give_a_database_that_is_not_finite(tmp_path, key, value):
     text = HEADER.replace(key, f"{key.split(' = ')[0]} = {value}")
-    accepted_or_refused(write(tmp_path, header=text))
+    assert_accepted_or_refused(write(tmp_path, header=text))
 
 
 # -- the command line ---------------------------------------------------------------------
