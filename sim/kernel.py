@@ -126,9 +126,15 @@ def fill_features(m, y, c, f):
 
 
 @njit(cache=True, error_model="numpy", inline="always")
-def _locate(nodes, start, count, rule, x):
-    """Lower node and fraction along one axis, by its extrapolation rule."""
-    i = 0
+def _locate(nodes, start, count, rule, x, i):
+    """Lower node and fraction along one axis, by its extrapolation rule.
+
+    The search starts at node ``i`` of the last call; the result does not depend on it.
+    """
+    if i > count - 2:
+        i = count - 2
+    while i > 0 and x < nodes[start + i]:
+        i -= 1
     while i < count - 2 and x >= nodes[start + i + 1]:
         i += 1
     a, b = nodes[start + i], nodes[start + i + 1]
@@ -151,7 +157,7 @@ def loads(m, work):
         out[j] = 0.0
     for a in range(m.axes.shape[0]):
         x = f[m.axes[a, 0]]
-        work.lower[a], work.fraction[a] = _locate(m.nodes, m.axes[a, 2], m.axes[a, 3], m.axes[a, 1], x)
+        work.lower[a], work.fraction[a] = _locate(m.nodes, m.axes[a, 2], m.axes[a, 3], m.axes[a, 1], x, work.lower[a])
     for g in range(m.groups.shape[0]):
         first, count = m.groups[g, 2], m.groups[g, 3]
         place[0], weight[0], corners = m.groups[g, 4], 1.0, 1
