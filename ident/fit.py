@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from ident.campaign import Campaign, find_campaigns, read_campaign
 from ident.identify import Identification, identify
+from ident.notes import group_unused, group_warnings
 from ident.store import commit, database_rows, digest
 from sim.errors import InputError
 
@@ -126,24 +127,6 @@ def coefficient_table(rows: pd.DataFrame) -> list[dict[str, Any]]:
     return table
 
 
-def _reasons(done: Fit) -> dict[tuple[str, str, str], list[str]]:
-    grouped: dict[tuple[str, str, str], list[str]] = {}
-    for run_id, file, _, output, reason in done.found.unused:
-        grouped.setdefault((file, output, reason), []).append(run_id)
-    return grouped
-
-
-def _warnings(done: Fit) -> Counter[str]:
-    """Warnings without the part that differs from run to run."""
-    return Counter(text.split(" by ")[0].split(": ", 1)[0] + " | " + _tail(text) for _, text in done.found.warnings)
-
-
-def _tail(text: str) -> str:
-    if "disagrees" in text:
-        return "runs at one point disagree by more than 2 standard errors"
-    return text.split(": ", 1)[-1]
-
-
 def show(done: Fit, console: Console) -> None:
     """Print the fit as tables.
 
@@ -182,15 +165,15 @@ def show(done: Fit, console: Console) -> None:
             ", ".join(words),
         )
     console.print(table)
-    for text, count in _warnings(done).items():
-        subject, message = text.split(" | ")
-        console.print(f"[yellow]warning[/] {escape(subject)}: {escape(message)} ({count}x)")
-    reasons = _reasons(done)
+    for warning in group_warnings(done.found.warnings):
+        console.print(f"[yellow]warning[/] ({warning.count}x) {escape(warning.shown)}", highlight=False)
     used = {r for n in done.found.nodes for r in n.runs}
     total = done.campaign.runs["run_id"]
     console.print(f"{len(used)} of {len(total)} runs used; loads left out, with the reason:")
-    for (file, output, reason), ids in reasons.items():
+    for left in group_unused(done.found.unused):
+        outputs = " ".join(dict.fromkeys(o for found in left.runs.values() for o in found))
+        ids = list(left.runs)
         shown = ", ".join(ids[:4]) + (f", ... {len(ids)} runs" if len(ids) > 4 else "")
-        console.print(f"  {escape(file)} {output}: {escape(reason)} [{escape(shown)}]", highlight=False)
+        console.print(f"  {escape(left.file)} {outputs}: {escape(left.reason)} [{escape(shown)}]", highlight=False)
     state = "committed" if done.new else "unchanged, nothing committed: already"
     console.print(f"[bold]{state} version {done.version}[/]  digest {done.digest[:16]}", highlight=False)

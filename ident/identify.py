@@ -14,7 +14,7 @@ everything found so far is carried through each subtraction.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from ident.campaign import DIRECT, Campaign, tests
 from ident.least_squares import gain_matrix, weights
+from ident.nodes import Node, key_point, table_points
 from ident.wake import wake_fraction
 from sim.catalogue import OUTPUTS, Term
 from sim.forces import axis_values, boat_features, body_velocity, multiplier, plane_features
@@ -33,22 +34,6 @@ Key = tuple[str, str]
 
 # Relative to the length: levers closer than this are the same lever, rounded.
 _LEVER_DIGITS = 1e-5
-
-
-@dataclass
-class Node:
-    """One unknown tabulated value: coefficient, part, point, and the runs behind it.
-
-    ``seen`` holds the (part, point) where runs stood: this one, its mirror image, or both.
-    """
-
-    name: str
-    part: str
-    point: Point
-    runs: list[str] = field(default_factory=list)
-    qualities: list[str] = field(default_factory=list)
-    worst: float = 0.0
-    seen: set[tuple[str, Point]] = field(default_factory=set)
 
 
 @dataclass
@@ -86,16 +71,11 @@ class Identification:
 
     def points(self, term: Term, part: str) -> tuple[list[Point], list[int], list[int]]:
         """Measured and mirrored points of a coefficient, their node and sign."""
-        return _points(self, term, part)
+        return table_points(self.nodes, term, part, self.campaign.vehicle)
 
 
-def _key_point(values: list[float]) -> Point:
-    """Axis values that compare equal however they were computed."""
-    return tuple(float(f"{v:.12g}") + 0.0 for v in values)
-
-
-class _Solver:
-    """The growing set of nodes with their covariance."""
+class Solver:
+    """The growing set of tabulated values with their covariance, stage by stage."""
 
     def __init__(self, campaign: Campaign) -> None:
         self.campaign = campaign
@@ -134,9 +114,10 @@ class _Solver:
 
     def place(self, term: Term, features: dict[str, float]) -> Point:
         """The tabulated point of a term in a state."""
-        return _key_point(axis_values(term, features))
+        return key_point(axis_values(term, features))
 
     def node(self, key: tuple[str, str, Point]) -> int:
+        """Number of the node at a place, new when nothing stood there."""
         if key not in self.index:
             self.index[key] = len(self.nodes)
             self.nodes.append(Node(*key))
@@ -146,7 +127,7 @@ class _Solver:
         """Table over the points found so far, with the node and sign of each point."""
         key = (term.name, part)
         if key not in self.tables:
-            points, nodes, signs = _points(self, term, part)
+            points, nodes, signs = table_points(self.nodes, term, part, self.vehicle)
             if not points:
                 return None
             rules = tuple(term.extrapolation[a] for a in term.axes)
@@ -193,9 +174,11 @@ class _Solver:
         return found
 
     def skip(self, run: pd.Series, output: str, reason: str) -> None:
+        """Note that a load of a run is not used, and why."""
         self.unused.append((run["run_id"], run["file"], int(run["row"]), output, reason))
 
     def load_equation(self, run: pd.Series, output: str, features: dict[str, float]) -> Equation | None:
+        """One load of a run: terms its test identifies are unknown, the others known."""
         unknowns: dict[int, float] = {}
         known: dict[int, float] = {}
         zero_by_symmetry = False
@@ -232,6 +215,7 @@ class _Solver:
         return None
 
     def equations(self, run: pd.Series) -> list[Equation]:
+        """Every usable load and directly measured coefficient of a run."""
         features = self.features(run)
         excluded = run["exclude"].split()
         found = []
@@ -319,38 +303,6 @@ class _Solver:
         return node
 
 
-def _points(found: _Solver | Identification, term: Term, part: str) -> tuple[list[Point], list[int], list[int]]:
-    """Measured points of a coefficient and their mirror images.
-
-    Points that symmetry makes zero get sign 0 (any node).
-    """
-    vehicle = found.campaign.vehicle
-    mirror = mirror_of(term, part, vehicle)
-    back = mirror_of_name(found, mirror.name, mirror.part)
-    points: dict[Point, tuple[int, int]] = {}
-    for i, node in enumerate(found.nodes):
-        if (node.name, node.part) == (term.name, part):
-            points[node.point] = (i, 1)
-    for i, node in enumerate(found.nodes):
-        if (node.name, node.part) == (mirror.name, mirror.part):
-            points.setdefault(back.point(node.point), (i, back.sign))
-    if points and (mirror.name, mirror.part) == (term.name, part) and mirror.sign < 0:
-        flips = [k for k, s in enumerate(mirror.axis_signs) if s < 0]
-        for point, (i, _) in list(points.items()):
-            centre = tuple(0.0 if k in flips else x for k, x in enumerate(point))
-            if flips:
-                points.setdefault(centre, (i, 0))
-    places = sorted(points)
-    return places, [points[p][0] for p in places], [points[p][1] for p in places]
-
-
-def mirror_of_name(found: _Solver | Identification, name: str, part: str) -> Mirror:
-    """The mirror of a coefficient given by name."""
-    vehicle = found.campaign.vehicle
-    term = next(t for t in vehicle_terms(vehicle) if t.name == name)
-    return mirror_of(term, part, vehicle)
-
-
 def _error_covariance(equations: list[Equation], sigma: Array) -> Array:
     """Measurement covariance: copies of a run share its error, with the sign of the load."""
     covariance = np.diag(sigma**2)
@@ -366,7 +318,7 @@ def _error_covariance(equations: list[Equation], sigma: Array) -> Array:
     return covariance
 
 
-def _check_levers(solver: _Solver) -> None:
+def _check_levers(solver: Solver) -> None:
     """Warn where a section's lever in the runs is not the vehicle file's."""
     runs, sections = solver.campaign.runs, solver.vehicle.sections
     if sections is None or not {"x", "y", "z"} <= set(runs):
@@ -380,7 +332,7 @@ def _check_levers(solver: _Solver) -> None:
             solver.warnings.append((str(runs.loc[i, "run_id"]), text))
 
 
-def _propulsion_point(solver: _Solver, runs: pd.DataFrame) -> None:
+def _propulsion_point(solver: Solver, runs: pd.DataFrame) -> None:
     """The wake fraction from the first self-propulsion run that gives revolutions."""
     speeds = runs[(runs["test"] == "self_propulsion") & runs["n"].notna()]
     if "w_T" not in solver.by_name or speeds.empty:
@@ -411,7 +363,7 @@ def identify(campaign: Campaign) -> Identification:
     -------
     Identification; runs that could not be used are listed with the reason.
     """
-    solver = _Solver(campaign)
+    solver = Solver(campaign)
     _check_levers(solver)
     stages = tests()["stage"]
     for stage in sorted(stages.unique()):

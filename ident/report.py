@@ -7,7 +7,6 @@ import csv
 import json
 import os
 import re
-from collections.abc import Iterable
 from datetime import UTC, datetime
 from importlib.resources import files
 from pathlib import Path
@@ -16,9 +15,10 @@ from typing import Any
 import pandas as pd
 
 from ident.derivatives import checks, derivatives
+from ident.notes import group_unused, group_warnings
 from ident.report_figures import draw_figures, equations, quality_colours
 from sim import catalogue
-from sim.catalogue import Term
+from sim.catalogue import RULES, Term
 from sim.coefficients import Coefficients
 from sim.database import Version, axis_columns, read_rows, versions
 from sim.errors import InputError
@@ -27,14 +27,6 @@ from sim.model import Environment
 from sim.parts import parts_of, vehicle_terms
 from sim.vehicle import Vehicle, load_vehicle
 
-RULES = {
-    "hold": "the value at the last point",
-    "linear": "the coefficient goes on straight",
-    "linear_load": "coefficient times axis goes on straight, so the coefficient tends to a constant",
-    "drift_odd": "Eq. (25), in-plane form, matched in value and slope at the last run, to 90 deg; constant beyond",
-    "drift_even": "Eq. (25), out-of-plane form, matched likewise",
-}
-_NUMBER = re.compile(r"(?<![\w.])[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?![\w.]*\w)")
 # Prime derivatives do not depend on density and gravity, so both may be anything.
 _UNIT = Environment(density=1.0, gravity=0.0)
 
@@ -161,39 +153,6 @@ def _signs(coefficients: Coefficients, rows: pd.DataFrame) -> dict[str, Any]:
     return {"speed": speed, "depth": depth, "rows": found, "passed": sum(d.ok for d in found), "sources": sources}
 
 
-def _pattern(text: str) -> tuple[str, list[float]]:
-    """A message with its numbers left out, and the numbers."""
-    return _NUMBER.sub("\N{HORIZONTAL ELLIPSIS}", text), [float(n) for n in _NUMBER.findall(text)]
-
-
-def _warnings(stored: Iterable[Any]) -> list[dict[str, Any]]:
-    """Warnings of the fit; the same text for the same coefficient counted together."""
-    groups: dict[str, dict[str, Any]] = {}
-    for entry in stored:
-        subject, message = (str(x) for x in entry)
-        text, numbers = _pattern(message)
-        group = groups.setdefault(text, {"text": text, "subjects": [], "numbers": [], "count": 0})
-        group["subjects"].append(subject)
-        group["numbers"] += numbers[:1]
-        group["count"] += 1
-    for group in groups.values():
-        numbers = sorted(group["numbers"])
-        group["range"] = " to ".join(dict.fromkeys(_figure(n) for n in (numbers[:1] + numbers[-1:])))
-        group["subjects"] = list(dict.fromkeys(group["subjects"]))
-    return list(groups.values())
-
-
-def _unused(stored: Iterable[Any]) -> list[dict[str, Any]]:
-    """Loads that were not used, by file and reason."""
-    groups: dict[tuple[str, str], dict[str, Any]] = {}
-    for entry in stored:
-        run, name, _, output, reason = (str(x) for x in entry)
-        group = groups.setdefault((name, reason), {"file": name, "reason": reason, "runs": {}, "count": 0})
-        group["runs"].setdefault(run, []).append(output)
-        group["count"] += 1
-    return list(groups.values())
-
-
 def _vocabulary(metadata: dict[str, str], rows: pd.DataFrame) -> list[dict[str, Any]]:
     """Quality words by rising factor, with the number of points behind each."""
     known = _stored(metadata, "quality", {})
@@ -238,8 +197,8 @@ def _content(db: str, number: int, vehicle: Vehicle, rows: pd.DataFrame) -> dict
         "points": len(rows),
         "pictures": draw_figures(vehicle, rows, colours, number),
         "signs": _signs(Coefficients(vehicle, rows), rows),
-        "warnings": _warnings(_stored(commit.metadata, "warnings", [])),
-        "unused": _unused(_stored(commit.metadata, "unused", [])),
+        "warnings": group_warnings(_stored(commit.metadata, "warnings", [])),
+        "unused": group_unused(_stored(commit.metadata, "unused", [])),
         "vocabulary": vocabulary,
         "colours": colours,
         "errata": _errata(),

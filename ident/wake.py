@@ -9,7 +9,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
-    from ident.identify import _Solver
+    from ident.identify import Solver
 
 Array = NDArray[np.float64]
 
@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 _STEP = 1e-6
 
 
-def _resistance(solver: _Solver, run: pd.Series) -> dict[int, float] | str:
+def _resistance(solver: Solver, run: pd.Series) -> dict[int, float] | str:
     """Tabulated values and their factors in -X of hull and undeflected planes."""
     state = run.copy()
     needed: dict[int, float] = {}
@@ -33,7 +33,7 @@ def _resistance(solver: _Solver, run: pd.Series) -> dict[int, float] | str:
     return needed
 
 
-def wake_fraction(solver: _Solver, run: pd.Series) -> tuple[float, float, Array] | str:
+def wake_fraction(solver: Solver, run: pd.Series) -> tuple[float, float, Array] | str:
     """Wake fraction of one self-propulsion run.
 
     (1-t) KT(J) rho n^2 D^4 balances hull and undeflected planes, and w_T = 1 - J n D / U.

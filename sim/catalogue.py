@@ -18,7 +18,15 @@ from importlib.resources import files
 
 OUTPUTS = ("X", "Y", "Z", "K", "M", "N")
 SETS = ("reduced", "gertler_hagen")
-RULES = ("hold", "linear", "linear_load", "drift_odd", "drift_even", "absent")
+# Extrapolation rules of an axis; ``sim.tables`` implements them.
+RULES = {
+    "hold": "the value at the last point",
+    "linear": "the coefficient goes on straight",
+    "linear_load": "coefficient times axis goes on straight, so the coefficient tends to a constant",
+    "drift_odd": "in-plane form of Eq. (25) through all runs of a side, from the last run on, to 90 deg",
+    "drift_even": "out-of-plane form of Eq. (25) with value and slope of the last two runs, to 90 deg",
+    "absent": "no coefficient on a side without runs",
+}
 
 # Sign of each output and state factor under the port/starboard mirror.
 MIRROR_OUTPUT = {"X": 1, "Y": -1, "Z": 1, "K": -1, "M": 1, "N": -1}
