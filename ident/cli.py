@@ -98,39 +98,71 @@ def fit(folder: Path, db: str, message: str, json_path: str | None) -> None:
 
 
 @main.command()
-@click.option("--case", "case", required=True, help="Bundled case name, or path to a case file.")
+@click.option("--case", "case", default=None, help="Bundled case name, or path to a case file.")
+@click.option("--all", "every", is_flag=True, help="Fly every bundled case and print the scoreboard.")
+@click.option(
+    "--cases", type=click.Path(path_type=Path), default=None, help="With --all: a folder of your own cases too."
+)
 @DB
 @VERSION
 @OUT
 @click.option("--json", "json_path", default=None, metavar="PATH|-", help="Write the comparison as JSON.")
-@click.option("--strict", is_flag=True, help="Exit 1 when a tolerance of the case file is missed.")
-def validate(case: str, db: str, version: int | None, out: Path, json_path: str | None, strict: bool) -> None:
+@click.option("--strict", is_flag=True, help="Exit 1 when a tolerance of a case file is missed.")
+def validate(
+    case: str | None,
+    every: bool,
+    cases: Path | None,
+    db: str,
+    version: int | None,
+    out: Path,
+    json_path: str | None,
+    strict: bool,
+) -> None:
     """Fly a maneuver from the database and compare it with its references.
 
     \b
     Example: ident validate --case hzz20 --json -
+             ident validate --all
     """
-    from ident.figures import case_figure
-    from ident.validate import show
-    from ident.validate import validate as run
     from sim.errors import InputError
     from sim.trim import NoEquilibrium
 
-    console = _console(quiet=json_path == "-")
-    try:
-        with console.status("flying the case (the first run on a machine compiles for half a minute)"):
-            done = run(case, db, version)
-    except NoEquilibrium as error:
-        raise InputError(f"case {case}", str(error), "a state the boat can hold") from error
-    show(done, console)
+    if (case is None) == (not every):
+        raise click.UsageError("give either --case NAME or --all")
     if out.exists() and not out.is_dir():
         raise InputError(str(out), "a file", "a folder for the figures")
-    figure = case_figure(done, out / f"{done.case.name}_v{done.result['database']['version']}.png")
-    console.print(f"figure: {figure}", highlight=False)
+    console = _console(quiet=json_path == "-")
+    try:
+        done, result = _one(case, db, version, console) if case else _all(db, version, cases, console)
+    except NoEquilibrium as error:
+        raise InputError(f"case {case or 'of --all'}", str(error), "a state the boat can hold") from error
+    from ident.figures import case_figure
+
+    for one in done:
+        figure = case_figure(one, out / f"{one.case.name}_v{one.result['database']['version']}.png")
+        console.print(f"figure: {figure}", highlight=False)
     if json_path:
-        _emit(done.result, json_path)
-    if strict and not done.result["passed"]:
+        _emit(result, json_path)
+    if strict and not all(one.result["passed"] for one in done):
         raise click.exceptions.Exit(1)
+
+
+def _one(case: str, db: str, version: int | None, console: Any) -> tuple[list[Any], dict[str, Any]]:
+    from ident.validate import show, validate
+
+    with console.status("flying the case (the first run on a machine compiles for half a minute)"):
+        done = validate(case, db, version)
+    show(done, console)
+    return [done], done.result
+
+
+def _all(db: str, version: int | None, cases: Path | None, console: Any) -> tuple[list[Any], dict[str, Any]]:
+    from ident.scoreboard import run_all, show
+
+    with console.status("flying") as status:
+        board, done = run_all(db, version, cases, lambda name: status.update(f"flying {name}"))
+    show(board, console)
+    return done, board
 
 
 @main.command()

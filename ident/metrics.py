@@ -1,7 +1,8 @@
-"""Zigzag metrics by the ITTC definitions, from any time history."""
+"""Zigzag and roll-decay metrics by the ITTC definitions, from any time history."""
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -111,3 +112,31 @@ def zigzag(
                     value = float(np.degrees(np.max(sense * (-1) ** k * rate[1][inside])))
             metrics[f"peak_{name}_rate_{k + 1}_degps"] = value
     return {k: float(v) if v is not None else None for k, v in metrics.items()}
+
+
+def roll_decay(t: Array, phi: Array) -> dict[str, float | None]:
+    """Roll period and damping of a free decay.
+
+    Parameters
+    ----------
+    t, phi : Times [s] and heel [rad].
+
+    Returns
+    -------
+    ``roll_period_s``: mean time between crossings of the mean heel, both ways.
+    ``log_decrement``: mean logarithm of successive half-cycle amplitudes' ratio, per period;
+    amplitudes from peak to trough, so that a constant heel does not matter.
+    None where the record holds less than two periods.
+    """
+    x = phi - phi.mean()
+    up = np.flatnonzero(x[:-1] * x[1:] < 0.0)
+    crossings = t[up] - x[up] * (t[up + 1] - t[up]) / (x[up + 1] - x[up])
+    if crossings.size < 5:
+        return {"roll_period_s": None, "log_decrement": None}
+    pieces = [x[a + 1 : b + 1] for a, b in itertools.pairwise(up)]
+    peaks = np.array([p[np.argmax(np.abs(p))] for p in pieces])
+    swings = np.abs(np.diff(peaks))
+    return {
+        "roll_period_s": float(2.0 * np.mean(np.diff(crossings))),
+        "log_decrement": float(2.0 * np.log(swings[0] / swings[-1]) / (swings.size - 1)),
+    }

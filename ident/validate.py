@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -10,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ident.metrics import zigzag
+from ident.metrics import roll_decay, zigzag
 from sim.case import Case, Series, load_case, load_reference
 from sim.coefficients import Coefficient, Coefficients
 from sim.database import axis_columns, read_rows, versions
@@ -46,9 +47,12 @@ class Validation:
     constant_axes: dict[str, list[str]]
 
 
-def rmse(simulation: Simulation, channel: str, time: Array, value: Array) -> float:
-    """Root mean square difference at the reference's own times, in its unit (rad, SI)."""
-    return float(np.sqrt(np.mean((np.interp(time, simulation["t"], simulation[channel]) - value) ** 2)))
+def rmse(simulation: Simulation, channel: str, series: tuple[Array, Array, str]) -> float:
+    """Root mean square difference at the reference's own times, in its unit."""
+    time, value, unit = series
+    flown = simulation[channel]
+    flown = np.degrees(flown) if unit.startswith("deg") else flown
+    return float(np.sqrt(np.mean((np.interp(time, simulation["t"], flown) - value) ** 2)))
 
 
 def _errors(case: Case, simulation: Simulation, reference: Series) -> dict[str, Any]:
@@ -65,15 +69,16 @@ def _errors(case: Case, simulation: Simulation, reference: Series) -> dict[str, 
             time, value, unit = reference[source][channel]
             flown = time <= end + 1e-9
             entry: dict[str, Any] = {
-                "rmse": rmse(simulation, channel, time[flown], value[flown]),
+                "rmse": rmse(simulation, channel, (time[flown], value[flown], unit)),
                 "unit": unit,
                 "n": int(flown.sum()),
                 "published_model_rmse": None,
                 "ratio": None,
             }
             if channel in published:
-                other = np.interp(time, published[channel][0], published[channel][1])
-                entry["published_model_rmse"] = float(np.sqrt(np.mean((other - value) ** 2)))
+                both = time <= published[channel][0][-1]
+                other = np.interp(time[both], published[channel][0], published[channel][1])
+                entry["published_model_rmse"] = float(np.sqrt(np.mean((other - value[both]) ** 2)))
                 entry["ratio"] = entry["rmse"] / entry["published_model_rmse"]
             found[source][channel] = entry
     return found
@@ -81,24 +86,45 @@ def _errors(case: Case, simulation: Simulation, reference: Series) -> dict[str, 
 
 def _metrics(case: Case, simulation: Simulation, reference: Series) -> dict[str, dict[str, float | None]]:
     dv, dh = case.command.dV, case.command.dH
+    if case.initial.heel_deg and case.initial.state == "as_given":
+        return _side_by_side(case, reference, "phi", roll_decay, (simulation["t"], simulation["phi"]))
     if "zigzag" not in (dv.law, dh.law):
         return {}
     command, angle, rate, name = (dh, "psi", "r", "yaw") if dh.law == "zigzag" else (dv, "theta", "q", "pitch")
     check, sense = math.radians(command.check_deg), 1 if command.first_deg > 0 else -1
-    columns = {}
-    flown = (simulation["t"], simulation[rate])
-    columns["simulated"] = zigzag(simulation["t"], simulation[angle], flown, check, sense, name)
+
+    def measure(t: Array, x: Array, turn: tuple[Array, Array] | None) -> dict[str, float | None]:
+        return zigzag(t, x, turn, check, sense, name)
+
+    metrics = _side_by_side(
+        case, reference, angle, measure, (simulation["t"], simulation[angle]), rate, (simulation["t"], simulation[rate])
+    )
     for i, (time, _) in enumerate(simulation.executes[1:4]):
-        columns["simulated"][f"execute_{i + 2}_s"] = float(time)
+        metrics[f"execute_{i + 2}_s"]["simulated"] = float(time)
+    return metrics
+
+
+def _side_by_side(
+    case: Case,
+    reference: Series,
+    angle: str,
+    measure: Callable[..., dict[str, float | None]],
+    flown: tuple[Array, Array],
+    rate: str | None = None,
+    flown_rate: tuple[Array, Array] | None = None,
+) -> dict[str, dict[str, float | None]]:
+    """Metrics of the simulated and every reference series, by metric and source."""
+    columns = {"simulated": measure(*flown, flown_rate) if rate else measure(*flown)}
     sources = [*case.reference.compare, case.reference.published_model] if case.reference else []
     for source in sources:
         series = reference[source or ""]
-        if angle in series:
-            time, value, unit = series[angle]
-            scale = math.radians(1.0) if unit == "deg" else 1.0
-            turn = series.get(rate)
-            label = "published_model" if case.reference and source == case.reference.published_model else str(source)
-            columns[label] = zigzag(time, scale * value, turn[:2] if turn else None, check, sense, name)
+        if angle not in series:
+            continue
+        time, value, unit = series[angle]
+        value = np.radians(value) if unit.startswith("deg") else value
+        turn = series[rate][:2] if rate and rate in series else None
+        label = "published_model" if case.reference and source == case.reference.published_model else str(source)
+        columns[label] = measure(time, value, turn) if rate else measure(time, value)
     return {k: {label: column.get(k) for label, column in columns.items()} for k in columns["simulated"]}
 
 

@@ -19,9 +19,9 @@ DIRECTIONS = {
 
 # Which body axis each quantity belongs to; quantities not listed do not turn.
 COMPONENTS = {
-    **dict.fromkeys(("x", "u", "udot", "X", "K", "p", "pdot", "phi"), "x"),
+    **dict.fromkeys(("x", "u", "u_over_U0", "udot", "X", "K", "p", "pdot", "phi"), "x"),
     **dict.fromkeys(("y", "v", "vdot", "Y", "M", "q", "qdot", "theta"), "y"),
-    **dict.fromkeys(("z", "w", "wdot", "Z", "N", "r", "rdot", "psi", "dz"), "z"),
+    **dict.fromkeys(("z", "w", "wdot", "Z", "N", "r", "rdot", "psi", "dz_over_L0"), "z"),
 }
 
 

@@ -32,6 +32,7 @@ class Simulation:
     executes : (k, 2) time [s] and command [rad] of each zigzag execute.
     trim : The initial equilibrium, or None.
     depth_offset : D0 = z + depth_offset.
+    length : Reference length L [m].
     """
 
     columns: tuple[str, ...]
@@ -39,13 +40,18 @@ class Simulation:
     executes: Array
     trim: Trim | None
     depth_offset: float
+    length: float
 
     def __getitem__(self, column: str) -> Array:
-        """One column by name; ``U``, ``D0`` and ``dz`` (up) are derived."""
+        """One column by name; ``U``, ``D0``, ``u_over_U0`` and ``dz_over_L0`` are derived."""
         if column == "U":
             return np.sqrt(self["u"] ** 2 + self["v"] ** 2 + self["w"] ** 2)
         if column == "D0":
             return self["z"] + self.depth_offset
+        if column == "u_over_U0":
+            return self["u"] / self["U"][0]
+        if column == "dz_over_L0":
+            return (self["z"] - self["z"][0]) / self.length
         return self.record[:, self.columns.index(column)]
 
 
@@ -133,4 +139,4 @@ def simulate(case: Case, coefficients: Coefficients) -> Simulation:
     steps, every = round(case.run.duration_s / dt), max(1, round(case.run.record_s / dt))
     record, executes = maneuver.fly(model, settings, state, controls, dt, steps, every)
     columns = ("t", *_STATES, *[p.name for p in vehicle.planes], "n", "dV", "dH")
-    return Simulation(columns, record, executes, trim, model.sail_top)
+    return Simulation(columns, record, executes, trim, model.sail_top, vehicle.particulars.length.value)

@@ -1,0 +1,112 @@
+"""`ident validate --all`: every case, every reference, one table."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ident.validate import Validation, validate
+from sim.database import read_rows, versions
+from sim.errors import InputError
+from sim.vehicle import bundled
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from rich.console import Console
+
+
+def case_names(folder: Path | None) -> list[str]:
+    """Bundled cases, and the case files of a user's folder.
+
+    Raises
+    ------
+    InputError
+        When the folder does not exist or holds no case file.
+    """
+    names = bundled("cases")
+    if folder is None:
+        return names
+    found = sorted(str(p) for p in folder.glob("*.toml")) if folder.is_dir() else []
+    if not found:
+        raise InputError(str(folder), "no case file", "a folder with case files (*.toml)")
+    return names + found
+
+
+def _mean_ratio(cases: list[dict[str, Any]]) -> float | None:
+    ratios = [
+        entry["ratio"]
+        for case in cases
+        for channels in case["references"].values()
+        for entry in channels.values()
+        if entry["ratio"]
+    ]
+    return math.exp(sum(math.log(r) for r in ratios) / len(ratios)) if ratios else None
+
+
+def run_all(
+    db: str, version: int | None, folder: Path | None, each: Callable[[str], None] = lambda name: None
+) -> tuple[dict[str, Any], list[Validation]]:
+    """Fly every case from one version.
+
+    Parameters
+    ----------
+    db, version : Database and version, latest when None.
+    folder : Users' own cases beside the bundled ones.
+    each : Called with the name of each case before it is flown.
+
+    Returns
+    -------
+    board : ``database``, ``cases`` (the single-case objects, each with ``trained``),
+        ``geometric_mean_ratio`` of the error ratios to the published model over cases the
+        version was trained on and not; None where there is none.
+    flown : The validations, in the order of the cases.
+
+    Raises
+    ------
+    InputError
+        As ``ident.validate.validate``.
+    """
+    names = case_names(folder)
+    number = read_rows(db, version)[1]
+    record = next(v for v in versions(db) if v.number == number)
+    trained = json.loads(record.metadata.get("trained", "[]"))
+    flown, cases = [], []
+    for name in names:
+        each(name)
+        done = validate(name, db, number)
+        flown.append(done)
+        cases.append({**done.result, "trained": done.case.name in trained})
+    board = {
+        "database": {"path": db, "version": number, "digest": record.digest},
+        "cases": cases,
+        "geometric_mean_ratio": {
+            "trained": _mean_ratio([c for c in cases if c["trained"]]),
+            "untrained": _mean_ratio([c for c in cases if not c["trained"]]),
+        },
+    }
+    return board, flown
+
+
+def show(board: dict[str, Any], console: Console) -> None:
+    """Print the scoreboard as a table."""
+    from rich.table import Table
+
+    database = board["database"]
+    table = Table(
+        *("case", "reference", "channel", "RMSE", "published model", "ratio", "unit", "trained"),
+        title=f"Scoreboard, database version {database['version']} ({database['digest'][:16]})",
+    )
+    for case in board["cases"]:
+        for source, channels in case["references"].items():
+            for channel, e in channels.items():
+                published = "-" if e["published_model_rmse"] is None else f"{e['published_model_rmse']:.4g}"
+                ratio = "-" if e["ratio"] is None else f"[{'green' if e['ratio'] <= 1 else 'red'}]{e['ratio']:.2f}[/]"
+                used = "yes" if case["trained"] else "no"
+                table.add_row(case["case"], source, channel, f"{e['rmse']:.4g}", published, ratio, e["unit"], used)
+    console.print(table)
+    for kind, value in board["geometric_mean_ratio"].items():
+        shown = "no case" if value is None else f"{value:.2f}"
+        console.print(f"geometric mean of the ratios, {kind} cases: {shown}", highlight=False)
