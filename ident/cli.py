@@ -186,6 +186,52 @@ def report(db: str, version: int | None, vehicle: str, out: Path) -> None:
 
 @main.command()
 @DB
+@VERSION
+@click.option("--case", "case", default="hzz20", show_default=True, help="Case that gives vehicle and environment.")
+@click.option("--speed", "speeds", type=click.FloatRange(min=0, min_open=True), multiple=True, help="U [m/s]; repeat.")
+@click.option("--depth", "depths", type=float, multiple=True, help="D0 [m]; repeat.")
+@click.option("--json", "json_path", default=None, metavar="PATH|-", help="Write the results as JSON.")
+def stability(
+    db: str,
+    version: int | None,
+    case: str,
+    speeds: tuple[float, ...],
+    depths: tuple[float, ...],
+    json_path: str | None,
+) -> None:
+    """Stability indices, eigenvalues and critical speeds against speed and depth.
+
+    Without --speed and --depth, at the tabulated speeds and the depths of the drift runs.
+
+    \b
+    Example: ident stability --speed 3 --speed 5 --depth 25
+    """
+    from ident.stability import as_json, show
+    from ident.stability import stability as at
+    from sim.case import load_case
+    from sim.coefficients import Coefficients
+    from sim.database import read_rows
+    from sim.model import Environment
+    from sim.vehicle import load_vehicle
+
+    data, _ = load_case(case)
+    vehicle = load_vehicle(data.vehicle)
+    rows, number = read_rows(db, version, vehicle.name)
+    drift = rows[rows["output"].eq("N") & rows["beta_deg"].notna()]
+    speeds = speeds or tuple(sorted(drift["speed_mps"].dropna().unique())) or (data.initial.speed_mps,)
+    depths = depths or tuple(sorted(drift["depth_m"].dropna().unique())) or (data.initial.depth_m,)
+    environment = Environment(data.environment.density_kgpm3, data.environment.gravity_mps2)
+    coefficients = Coefficients(vehicle, rows)
+    console = _console(quiet=json_path == "-")
+    with console.status("linearising"):
+        found = [at(coefficients, environment, u, d) for d in depths for u in speeds]
+    show(found, f"{vehicle.title}, database version {number}", console)
+    if json_path:
+        _emit(as_json(found), json_path)
+
+
+@main.command()
+@DB
 @click.option("--json", "json_path", default=None, metavar="PATH|-", help="Write the list as JSON.")
 def versions(db: str, json_path: str | None) -> None:
     """List the versions of a database.

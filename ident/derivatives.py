@@ -88,21 +88,46 @@ class _Parts(Coefficients):
         self._all = {(c.term.name, c.part): c for c in whole if c.part in parts}
 
 
-def _loads(model: kernel.Model, n_planes: int, motion: Array, depth: float, revolutions: float) -> Array:
-    """X Y Z K M N [N, N m] at u v w p q r with all planes at zero."""
-    work = kernel.workspace(n_planes)
+def loads(model: kernel.Model, motion: Array, depth: float, controls: Array) -> Array:
+    """Hydrodynamic loads of the assembled boat in one state.
+
+    Parameters
+    ----------
+    model : The boat.
+    motion : u v w p q r [m/s, rad/s].
+    depth : D0 [m].
+    controls : (planes + 1,) deflections [rad] and n [1/s].
+
+    Returns
+    -------
+    X Y Z K M N [N, N m], program frame.
+    """
+    work = kernel.workspace(controls.size - 1)
     state = np.zeros(12)
     state[:6] = motion
     state[8] = depth - model.sail_top
-    controls = np.zeros(n_planes + 1)
-    controls[-1] = revolutions
     kernel.fill_features(model, state, controls, work.features)
     kernel.loads(model, work)
     return work.loads[: len(OUTPUTS)].copy()
 
 
-def _slope(model: kernel.Model, vehicle: Vehicle, name: str, speed: float, depth: float, revolutions: float) -> Array:
-    """Central difference of the loads by one motion [N, N m per m/s or rad/s]."""
+def slope(model: kernel.Model, vehicle: Vehicle, name: str, speed: float, depth: float, revolutions: float) -> Array:
+    """Central difference of the loads by one motion about straight ahead motion.
+
+    Steps as in ``derivatives``; planes at zero.
+
+    Parameters
+    ----------
+    model, vehicle : The boat.
+    name : Motion, one of v w p q r.
+    speed, depth, revolutions : U [m/s], D0 [m], n [1/s].
+
+    Returns
+    -------
+    (6,) slopes of X Y Z K M N [N or N m per m/s or rad/s].
+    """
+    controls = np.zeros(len(vehicle.planes) + 1)
+    controls[-1] = revolutions
     turned = name in "vw"
     step = speed * math.sin(_FLOW_STEP) if turned else _RATE_STEP * speed / vehicle.particulars.length.value
     side = []
@@ -111,8 +136,14 @@ def _slope(model: kernel.Model, vehicle: Vehicle, name: str, speed: float, depth
         # A flow angle turns the velocity: its size stays at the tabulated speed.
         motion[0] = speed * math.cos(_FLOW_STEP) if turned else speed
         motion[_MOTIONS.index(name)] = sign * step
-        side.append(_loads(model, len(vehicle.planes), motion, depth, revolutions))
+        side.append(loads(model, motion, depth, controls))
     return (side[0] - side[1]) / (2.0 * step)
+
+
+def prime_scale(output: str, motion: str, density: float, length: float) -> float:
+    """1/2 rho L^n of a linear derivative: n = 2 for a force by v or w, one more for a
+    moment, one more for a rate."""
+    return 0.5 * density * length ** (2 + (output in "KMN") + (motion in "pqr"))
 
 
 def derivatives(
@@ -155,9 +186,8 @@ def derivatives(
     for check in checks():
         output, motion = check.symbol.split("_")
         if motion not in slopes:
-            slopes[motion] = [_slope(m, vehicle, motion, speed, depth, revolutions) for m in models]
-        power = 2 + (output in "KMN") + (motion in "pqr")
-        scale = 0.5 * environment.density * length**power * speed
+            slopes[motion] = [slope(m, vehicle, motion, speed, depth, revolutions) for m in models]
+        scale = prime_scale(output, motion, environment.density, length) * speed
         hull, whole = (float(s[OUTPUTS.index(output)]) / scale for s in slopes[motion])
         found.append(Derivative(check.symbol, hull, whole, check.expected, check.suboff, whole * check.expected > 0.0))
     return found
