@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from ident.validate import Validation
+from sim.simulate import CHANNELS
 
 FRAME = "frame: x forward, y starboard, z down; psi and r positive to starboard"
 _LABELS = {
@@ -22,10 +23,10 @@ _LABELS = {
     "x": "advance x",
     "y": "transfer y",
     "z": "depth of the origin z",
+    "u_over_U0": "surge speed u/U0",
+    "dz_over_L0": "depth change dz/L",
 }
 _STYLE = {"EXP": ("k", "o"), "CFD": ("tab:blue", "s")}
-_UNITS = dict.fromkeys(("psi", "theta", "phi"), "rad") | dict.fromkeys("pqr", "rad/s")
-_UNITS |= dict.fromkeys("uvw", "m/s") | dict.fromkeys("xyz", "m")
 
 
 def _shown(channel: str, values: np.ndarray, unit: str) -> tuple[np.ndarray, str]:
@@ -57,7 +58,7 @@ def case_figure(done: Validation, path: Path) -> Path:
     rows = (len(channels) + 1) // 2
     figure, axes = plt.subplots(rows, 2, figsize=(11, 2.7 * rows), sharex=True, layout="constrained")
     for channel, axis in zip(channels, np.ravel(axes), strict=False):
-        unit = _UNITS.get(channel, "")
+        unit = CHANNELS[channel]
         for source in [*reference.compare, reference.published_model] if reference else []:
             series = done.reference[source or ""]
             if channel not in series:
@@ -69,7 +70,7 @@ def case_figure(done: Validation, path: Path) -> Path:
             else:
                 colour, marker = _STYLE.get(str(source), ("tab:gray", "^"))
                 axis.plot(time, values, color=colour, marker=marker, ms=2.5, lw=0.6, markevery=4, label=source)
-        values, unit = _shown(channel, done.simulation[channel], unit)
+        values, unit = _shown(channel, done.simulation[channel], CHANNELS[channel])
         axis.plot(done.simulation["t"], values, color="tab:red", lw=1.6, label="simulated from the database")
         axis.set_ylabel(f"{_LABELS.get(channel, channel)} [{unit}]")
         axis.grid(alpha=0.3)

@@ -17,7 +17,7 @@ from sim.coefficients import Coefficient, Coefficients
 from sim.database import axis_columns, read_rows, versions
 from sim.errors import InputError
 from sim.forces import boat_features, plane_features
-from sim.simulate import Simulation, simulate
+from sim.simulate import CHANNELS, Simulation, simulate
 from sim.vehicle import load_vehicle
 
 if TYPE_CHECKING:
@@ -55,6 +55,31 @@ def rmse(simulation: Simulation, channel: str, series: tuple[Array, Array, str])
     return float(np.sqrt(np.mean((np.interp(time, simulation["t"], flown) - value) ** 2)))
 
 
+def check_reference(case: Case, reference: Series, where: str) -> None:
+    """Refuse sources, channels and units that cannot be compared.
+
+    Raises
+    ------
+    InputError
+        Naming the case file, what was found and what is allowed.
+    """
+    if case.reference is None:
+        return
+    named = {*case.reference.compare, *([case.reference.published_model] if case.reference.published_model else [])}
+    for source in sorted(named - set(reference.data)):
+        raise InputError(f"{where}, key reference", f"source {source!r}", f"one of {', '.join(reference.data)}")
+    for channel in case.reference.channels:
+        if channel not in CHANNELS:
+            raise InputError(f"{where}, key reference.channels", repr(channel), ", ".join(CHANNELS))
+        allowed = {CHANNELS[channel], CHANNELS[channel].replace("rad", "deg")}
+        units = {reference[source][channel][2] for source in named if channel in reference[source]}
+        if not units:
+            raise InputError(f"{where}, key reference.channels", repr(channel), "a channel of the reference file")
+        for unit in sorted(units - allowed):
+            text = f"{channel} in {unit!r}"
+            raise InputError(case.reference.file, text, " or ".join(sorted(allowed)))
+
+
 def _errors(case: Case, simulation: Simulation, reference: Series) -> dict[str, Any]:
     if case.reference is None:
         return {}
@@ -76,9 +101,12 @@ def _errors(case: Case, simulation: Simulation, reference: Series) -> dict[str, 
                 "ratio": None,
             }
             if channel in published:
-                both = time <= published[channel][0][-1]
-                other = np.interp(time[both], published[channel][0], published[channel][1])
-                entry["published_model_rmse"] = float(np.sqrt(np.mean((other - value[both]) ** 2)))
+                other_time, other, other_unit = published[channel]
+                if other_unit != unit:
+                    other = np.degrees(other) if unit.startswith("deg") else np.radians(other)
+                both = flown & (time <= other_time[-1])
+                gap = np.interp(time[both], other_time, other) - value[both]
+                entry["published_model_rmse"] = float(np.sqrt(np.mean(gap**2)))
                 entry["ratio"] = entry["rmse"] / entry["published_model_rmse"]
             found[source][channel] = entry
     return found
@@ -216,6 +244,7 @@ def validate(name: str, db: str, version: int | None = None) -> Validation:
     """
     case, where = load_case(name)
     reference = load_reference(case, where)
+    check_reference(case, reference, where)
     vehicle_name: str | Path = case.vehicle
     if case.vehicle.endswith(".toml"):
         vehicle_name = Path(where).parent / case.vehicle

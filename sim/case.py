@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from sim.errors import InputError, explain
 from sim.frames import Frame, FrameError
@@ -17,6 +17,9 @@ from sim.vehicle import bundled, read_toml
 
 Array = NDArray[np.float64]
 Positive = Annotated[float, Field(gt=0)]
+
+# A record of more steps than this does not fit a laptop's memory.
+_MOST_STEPS = 1e7
 
 
 class _Data(BaseModel):
@@ -40,13 +43,27 @@ class Initial(_Data):
     pitch_deg: float = 0.0
     revolutions_rps: float | None = None
 
+    @model_validator(mode="after")
+    def _propelled_boats_move(self) -> Initial:
+        if self.state == "self_propulsion" and self.speed_mps == 0.0:
+            raise ValueError("self_propulsion needs a speed; use as_given for a boat at rest")
+        return self
+
 
 class Run(_Data):
     """Duration, control sample (and integration step), and time between records."""
 
-    duration_s: Positive
-    step_s: Positive
+    duration_s: Annotated[float, Field(gt=0, le=1e5)]
+    step_s: Annotated[float, Field(gt=0, le=10.0)]
     record_s: Positive
+
+    @model_validator(mode="after")
+    def _a_run_of_a_size(self) -> Run:
+        if self.duration_s / self.step_s > _MOST_STEPS:
+            raise ValueError(f"more than {_MOST_STEPS:g} steps")
+        if self.record_s < self.step_s:
+            raise ValueError("record_s is shorter than step_s")
+        return self
 
 
 class PlaneCommand(_Data):
@@ -70,6 +87,12 @@ class PlaneCommand(_Data):
     I_psi: float = 0.0
     D_psi: float = 0.0
 
+    @model_validator(mode="after")
+    def _zigzag_has_angles(self) -> PlaneCommand:
+        if self.law == "zigzag" and not (self.first_deg and self.check_deg > 0.0):
+            raise ValueError("a zigzag needs first_deg, not zero, and check_deg, positive")
+        return self
+
     def gains(self, distance: str, angle: str) -> list[float]:
         """P I D on a distance [rad/m] and on an angle [rad/rad]."""
         first = [math.radians(getattr(self, f"{k}_{distance}")) for k in "PID"]
@@ -91,6 +114,12 @@ class Commands(_Data):
     dV: PlaneCommand
     dH: PlaneCommand
     n: SpeedCommand
+
+    @model_validator(mode="after")
+    def _one_zigzag(self) -> Commands:
+        if self.dV.law == self.dH.law == "zigzag":
+            raise ValueError("one zigzag at a time: in dV or in dH")
+        return self
 
 
 class FrameData(_Data):

@@ -26,6 +26,7 @@ def explain(where: str, error: ValidationError) -> InputError:
     key = ".".join(str(k) for k in first["loc"]) or "the file"
     given = first.get("input")
     shown = "nothing" if first["type"] == "missing" else repr(given)[:80]
+    allowed = "this key" if first["type"] == "missing" else first["msg"].removeprefix("Value error, ")
     more = error.error_count() - 1
     rest = f"; {more} more problem{'s' if more > 1 else ''}" if more else ""
-    return InputError(f"{where}, key {key}", f"{shown}", f"{first['msg']}{rest}")
+    return InputError(f"{where}, key {key}", f"{shown}", f"{allowed}{rest}")

@@ -18,6 +18,11 @@ from sim.vehicle import Vehicle
 
 Array = NDArray[np.float64]
 _STATES = ("u", "v", "w", "p", "q", "r", "x", "y", "z", "phi", "theta", "psi")
+
+# Channels a reference may hold, with the unit of the simulation.
+CHANNELS = dict.fromkeys(("u", "v", "w", "U"), "m/s") | dict.fromkeys(("p", "q", "r"), "rad/s")
+CHANNELS |= dict.fromkeys(("x", "y", "z", "D0"), "m") | dict.fromkeys(("phi", "theta", "psi"), "rad")
+CHANNELS |= {"u_over_U0": "-", "dz_over_L0": "-", "n": "1/s"}
 _LAWS = {"fixed": maneuver.FIXED, "pid": maneuver.PID, "zigzag": maneuver.ZIGZAG}
 
 

@@ -1,0 +1,84 @@
+"""A user's own case file: flown like a bundled one, and refused with the place named."""
+
+from __future__ import annotations
+
+from importlib.resources import files
+
+import pytest
+
+from ident.validate import validate
+from sim.errors import InputError
+
+TEXT = (files("sim") / "cases" / "roll-decay.toml").read_text("utf-8")
+SERIES = (files("sim") / "cases" / "data" / "roll_decay.csv").read_text("utf-8")
+
+
+@pytest.fixture
+def write(tmp_path):
+    def write(text: str = TEXT, series: str = SERIES) -> str:
+        (tmp_path / "data").mkdir(exist_ok=True)
+        (tmp_path / "data" / "roll_decay.csv").write_text(series)
+        path = tmp_path / "mine.toml"
+        path.write_text(text)
+        return str(path)
+
+    return write
+
+
+def test_own_case_gives_what_the_bundled_one_gives(write, fitted_db):
+    own, bundled = (validate(name, fitted_db).result for name in (write(), "roll-decay"))
+    assert own["references"] == bundled["references"]
+    assert own["metrics"] == bundled["metrics"]
+
+
+def test_reference_in_degrees_gives_the_same_error_in_degrees(write, fitted_db):
+    lines = SERIES.splitlines()
+    turned = [lines[0]]
+    for line in lines[1:]:
+        source, channel, t, value, _, *rest = line.split(",")
+        turned.append(",".join([source, channel, t, repr(float(value) * 57.29577951308232), "deg", *rest]))
+    found = validate(write(series="\n".join(turned)), fitted_db).result["references"]["EXP"]["phi"]
+    known = validate("roll-decay", fitted_db).result["references"]["EXP"]["phi"]
+    assert found["unit"] == "deg"
+    assert found["rmse"] == pytest.approx(known["rmse"] * 57.29577951308232)
+    assert found["ratio"] == pytest.approx(known["ratio"])
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ('channels = ["phi"]', 'channels = ["heel"]', ["reference.channels", "heel", "phi"]),
+        ('channels = ["phi"]', 'channels = ["psi"]', ["reference.channels", "psi"]),
+        ('compare = ["EXP"]', 'compare = ["TANK"]', ["TANK", "EXP"]),
+        ("duration_s = 120.0", "duration_s = -1.0", ["run.duration_s", "-1.0"]),
+        ("record_s = 0.1", "record_s = 0.01", ["record_s"]),
+        ('state = "as_given"', 'state = "self_propulsion"', ["needs a speed"]),
+        ('[command.dH]\nlaw = "fixed"', '[command.dH]\nlaw = "zigzag"', ["first_deg"]),
+        ('z = "up"', 'z = "down"', ["left-handed"]),
+        ('vehicle = "bb2"', 'vehicle = "bb3"', ["bb3", "bb2"]),
+        ("speed_mps = 0.0\n", "", ["initial.speed_mps", "nothing"]),
+        ("data/roll_decay.csv", "data/none.csv", ["none.csv", "missing"]),
+    ],
+)
+def test_mistake_in_a_case_is_named(write, fitted_db, old, new, words):
+    assert old in TEXT
+    with pytest.raises(InputError) as caught:
+        validate(write(TEXT.replace(old, new)), fitted_db)
+    for word in words:
+        assert word in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("rad", "furlong", ["furlong", "rad"]),
+        ("value", "valu", ["column value missing"]),
+        ("-0.076853", "nan", ["row", "column value", "nan"]),
+    ],
+)
+def test_mistake_in_a_reference_is_named(write, fitted_db, old, new, words):
+    assert old in SERIES
+    with pytest.raises(InputError) as caught:
+        validate(write(series=SERIES.replace(old, new)), fitted_db)
+    for word in words:
+        assert word in str(caught.value)
