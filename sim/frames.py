@@ -21,7 +21,7 @@ DIRECTIONS = {
 COMPONENTS = {
     **dict.fromkeys(("x", "u", "u_over_U0", "udot", "X", "K", "p", "pdot", "phi"), "x"),
     **dict.fromkeys(("y", "v", "vdot", "Y", "M", "q", "qdot", "theta"), "y"),
-    **dict.fromkeys(("z", "w", "wdot", "Z", "N", "r", "rdot", "psi", "dz_over_L0"), "z"),
+    **dict.fromkeys(("z", "w", "wdot", "Z", "N", "r", "rdot", "psi", "dz", "dz_over_L0"), "z"),
 }
 
 
