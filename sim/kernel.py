@@ -85,12 +85,12 @@ def workspace(n_planes: int) -> Work:
 
 
 @njit(cache=True, error_model="numpy", inline="always")
-def _sign(x):
+def _sign(x: float) -> float:
     return 1.0 if x > 0.0 else (-1.0 if x < 0.0 else 0.0)
 
 
 @njit(cache=True, error_model="numpy", inline="always")
-def fill_features(m, y, c, f):
+def fill_features(m: Model, y: np.ndarray, c: np.ndarray, f: np.ndarray) -> None:
     """State features in the order of the catalogue, then three per plane, then 1."""
     u, v, w, p, q, r = y[0], y[1], y[2], y[3], y[4], y[5]
     n_planes = m.planes.shape[0]
@@ -126,7 +126,7 @@ def fill_features(m, y, c, f):
 
 
 @njit(cache=True, error_model="numpy", inline="always")
-def _locate(nodes, start, count, rule, x, i):
+def _locate(nodes: np.ndarray, start: int, count: int, rule: int, x: float, i: int) -> tuple[int, float]:
     """Lower node and fraction along one axis, by its extrapolation rule.
 
     The search starts at node ``i`` of the last call; the result does not depend on it.
@@ -149,7 +149,7 @@ def _locate(nodes, start, count, rule, x, i):
 
 
 @njit(cache=True, error_model="numpy", inline="always")
-def loads(m, work):
+def loads(m: Model, work: Work) -> None:
     """Hydrodynamic loads X Y Z K M N from the features in ``work``; into ``work.loads``."""
     f, values, out = work.features, work.values, work.loads
     place, weight = work.place, work.weight
@@ -190,7 +190,7 @@ def loads(m, work):
 
 
 @njit(cache=True, error_model="numpy")
-def rhs(m, y, c, work, dy):
+def rhs(m: Model, y: np.ndarray, c: np.ndarray, work: Work, dy: np.ndarray) -> None:
     """Time derivative of the state, Eqs. (12)-(16) as corrected, added mass on the left.
 
     Parameters
@@ -242,7 +242,16 @@ def rhs(m, y, c, work, dy):
 
 
 @njit(cache=True, error_model="numpy")
-def rk4(m, y, c, rate, h, work, stages, out):
+def rk4(
+    m: Model,
+    y: np.ndarray,
+    c: np.ndarray,
+    rate: np.ndarray,
+    h: float,
+    work: Work,
+    stages: np.ndarray,
+    out: np.ndarray,
+) -> None:
     """One classical Runge-Kutta step with controls that move at constant rate.
 
     Parameters

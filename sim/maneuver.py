@@ -12,11 +12,11 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from sim.kernel import rk4, workspace
+from sim.kernel import Model, Work, rk4, workspace
 
 FIXED, PID, ZIGZAG = 0, 1, 2
 VERTICAL, HORIZONTAL = 0, 1
-# Columns of the record after time and the 12 states: planes, n, dV, dH.
+# Time [s] to which a zigzag reversal is located.
 _EVENT_TOLERANCE = 1e-10
 
 
@@ -51,12 +51,12 @@ class Settings(NamedTuple):
 
 
 @njit(cache=True, error_model="numpy")
-def _clip(x, low, high):
+def _clip(x: float, low: float, high: float) -> float:
     return low if x < low else (high if x > high else x)
 
 
 @njit(cache=True, error_model="numpy")
-def _pid(s, axis, errors, rates, integrals, dt):
+def _pid(s: Settings, axis: int, errors: np.ndarray, rates: np.ndarray, integrals: np.ndarray, dt: float) -> float:
     """One loop pair; integrators stop while the command is limited (anti-windup)."""
     g = s.gains[axis]
     command = s.trim[axis]
@@ -72,7 +72,15 @@ def _pid(s, axis, errors, rates, integrals, dt):
 
 
 @njit(cache=True, error_model="numpy")
-def autopilot(s, y, dy, sense, integrals, dt, command):
+def autopilot(
+    s: Settings,
+    y: np.ndarray,
+    dy: np.ndarray,
+    sense: float,
+    integrals: np.ndarray,
+    dt: float,
+    command: np.ndarray,
+) -> None:
     """Commands dV, dH [rad] and n [1/s] of this sample, Eqs. (9)-(10).
 
     dV = P_z (z - z_t) + P_theta (theta_t - theta) + ..., dH = P_y (y_t - y) +
@@ -105,7 +113,7 @@ def autopilot(s, y, dy, sense, integrals, dt, command):
 
 
 @njit(cache=True, error_model="numpy")
-def _actuators(s, command, c, dt, rate):
+def _actuators(s: Settings, command: np.ndarray, c: np.ndarray, dt: float, rate: np.ndarray) -> None:
     """Rates of planes and revolutions towards the mixed command, Eq. (1)."""
     n_planes = s.mixer.shape[0]
     for i in range(n_planes):
@@ -116,7 +124,7 @@ def _actuators(s, command, c, dt, rate):
 
 
 @njit(cache=True, error_model="numpy")
-def _past_check(s, y, sense):
+def _past_check(s: Settings, y: np.ndarray, sense: float) -> float:
     """Positive once the checked angle has passed the check value of the present leg."""
     if s.law[HORIZONTAL] == ZIGZAG:
         return sense * np.sign(s.value[HORIZONTAL]) * y[11] - s.check[HORIZONTAL]
@@ -126,7 +134,18 @@ def _past_check(s, y, sense):
 
 
 @njit(cache=True, error_model="numpy")
-def _crossing(m, s, y, c, rate, h, sense, work, stages, trial):
+def _crossing(
+    m: Model,
+    s: Settings,
+    y: np.ndarray,
+    c: np.ndarray,
+    rate: np.ndarray,
+    h: float,
+    sense: float,
+    work: Work,
+    stages: np.ndarray,
+    trial: np.ndarray,
+) -> float:
     """Time into the step at which the checked angle reaches the check value."""
     low, high = 0.0, h
     while high - low > _EVENT_TOLERANCE:
@@ -140,7 +159,18 @@ def _crossing(m, s, y, c, rate, h, sense, work, stages, trial):
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
-def run(m, s, y0, c0, dt, steps, every, work, record, executes):
+def run(
+    m: Model,
+    s: Settings,
+    y0: np.ndarray,
+    c0: np.ndarray,
+    dt: float,
+    steps: int,
+    every: int,
+    work: Work,
+    record: np.ndarray,
+    executes: np.ndarray,
+) -> tuple[int, int]:
     """Integrate a maneuver.
 
     Parameters
@@ -201,7 +231,9 @@ def run(m, s, y0, c0, dt, steps, every, work, record, executes):
     return rows, events
 
 
-def fly(model, settings, y0, c0, dt: float, steps: int, every: int):
+def fly(
+    model: Model, settings: Settings, y0: np.ndarray, c0: np.ndarray, dt: float, steps: int, every: int
+) -> tuple[np.ndarray, np.ndarray]:
     """``run`` with its arrays allocated.
 
     Returns

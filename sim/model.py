@@ -77,12 +77,10 @@ def added_mass_matrix(coefficients: Coefficients, environment: Environment) -> A
 
 def _refine(grid: Array, axis: int, old: Array, new: Array) -> Array:
     """Values on a finer axis; exact for multilinear tables that hold beyond their ends."""
-    moved = np.moveaxis(grid, axis, -1)
-    if old.size == 1:
-        fine = np.repeat(moved, new.size, axis=-1)
-    else:
-        fine = np.apply_along_axis(lambda v: np.interp(new, old, v), -1, moved)
-    return np.moveaxis(fine, -1, axis)
+    if old.size == new.size:
+        return grid
+    matrix = np.stack([np.interp(new, old, unit) for unit in np.eye(old.size)], axis=1)
+    return np.moveaxis(np.tensordot(matrix, grid, axes=(1, axis)), 0, axis)
 
 
 def _group_key(coefficient: Coefficient) -> tuple[object, ...]:

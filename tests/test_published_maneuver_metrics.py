@@ -42,7 +42,7 @@ VZZ10_10KT = {
 }
 
 
-def _close(found: dict[str, float | None], published: dict[str, tuple[float, float]]) -> None:
+def assert_close(found: dict[str, float | None], published: dict[str, tuple[float, float]]) -> None:
     for metric, (value, sigma) in published.items():
         assert found[metric] == pytest.approx(value, abs=4.0 * sigma), metric
 
@@ -51,7 +51,7 @@ def _close(found: dict[str, float | None], published: dict[str, tuple[float, flo
 def test_horizontal_zigzag(source):
     case, where = load_case("hzz20")
     t, psi, _ = load_reference(case, where)[source]["psi"]
-    _close(zigzag(t, psi, None, np.radians(20.0), -1, "yaw"), HZZ20[source])
+    assert_close(zigzag(t, psi, None, np.radians(20.0), -1, "yaw"), HZZ20[source])
 
 
 def test_peak_yaw_rates_of_the_experiment():
@@ -68,7 +68,7 @@ def test_vertical_zigzag(source):
     case, where = load_case("vzz10-10kt")
     t, theta, unit = load_reference(case, where)[source]["theta"]
     assert unit == "deg"
-    _close(zigzag(t, np.radians(theta), None, np.radians(10.0), 1, "pitch"), VZZ10_10KT[source])
+    assert_close(zigzag(t, np.radians(theta), None, np.radians(10.0), 1, "pitch"), VZZ10_10KT[source])
 
 
 @pytest.mark.parametrize(("source", "period", "sigma"), [("EXP", 12.684, 0.02), ("HDM", 13.036, 0.011)])
