@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from ident import __version__
 from ident.identify import Identification
@@ -18,6 +19,10 @@ from sim.parts import parts_of, vehicle_terms
 
 # A conflicting commit of another fit is looked at again this often.
 _TRIES = 3
+# Correlations below this are rounding.
+_LEAST_CORRELATION = 1e-6
+
+Array = NDArray[np.float64]
 
 
 def database_rows(found: Identification) -> pd.DataFrame:
@@ -40,6 +45,7 @@ def database_rows(found: Identification) -> pd.DataFrame:
     columns = {axis: column for column, axis in axis_columns().items()}
     factor = {k: q.factor for k, q in found.campaign.header.quality.items()}
     stderr = np.sqrt(np.clip(np.diag(found.covariance), 0.0, None))
+    correlated = _correlations(found.covariance, stderr)
     rows = []
     for term in vehicle_terms(vehicle):
         for part in parts_of(term, vehicle):
@@ -60,6 +66,7 @@ def database_rows(found: Identification) -> pd.DataFrame:
                     "quality": max(node.qualities, key=lambda q: factor[q]) if sign else "",
                     "origin": origin if sign else "symmetry",
                     "estimate": index if sign else -1,
+                    "correlation": correlated.get(index, "") if sign else "",
                     "worst_residual": node.worst if sign else 0.0,
                     "extrapolation": " ".join(f"{a}:{r}" for a, r in term.extrapolation.items()),
                     "equation": term.equation,
@@ -74,6 +81,17 @@ def database_rows(found: Identification) -> pd.DataFrame:
     table = pd.DataFrame(rows).reindex(columns=column_order())
     _check_finite(table, found.campaign.header.name)
     return table
+
+
+def _correlations(covariance: Array, stderr: Array) -> dict[int, str]:
+    """Estimate -> the estimates correlated with it, as text."""
+    scale = np.outer(stderr, stderr)
+    matrix = np.divide(covariance, scale, out=np.zeros_like(covariance), where=scale > 0.0)
+    np.fill_diagonal(matrix, 0.0)
+    found: dict[int, list[str]] = {}
+    for i, j in np.argwhere(np.abs(matrix) > _LEAST_CORRELATION):
+        found.setdefault(int(i), []).append(f"{j}:{matrix[i, j]:.6g}")
+    return {i: " ".join(items) for i, items in found.items()}
 
 
 def _check_finite(rows: pd.DataFrame, where: str) -> None:

@@ -29,6 +29,7 @@ COLUMNS = {
     "quality": "worst quality word among those runs",
     "origin": "measured, mirror (port/starboard image of a run) or symmetry (zero by it)",
     "estimate": "values with the same number are one estimate",
+    "correlation": "estimate:coefficient of every estimate whose error is correlated with this one's",
     "worst_residual": "largest disagreement among the runs, in standard errors",
     "extrapolation": "rule beyond the data, axis by axis",
     "equation": "equations of the source",
@@ -53,6 +54,11 @@ def from_column(column: str, value: float) -> float:
 def to_column(column: str, value: float) -> float:
     """Database value of an axis value in radians or SI."""
     return float(f"{math.degrees(value):.10g}") if column.endswith("_deg") else value
+
+
+def correlation_pairs(text: str) -> dict[int, float]:
+    """The ``correlation`` cell: estimate number -> correlation coefficient."""
+    return {int(k): float(v) for k, v in (item.split(":") for item in text.split())}
 
 
 def column_order() -> list[str]:

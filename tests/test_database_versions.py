@@ -15,7 +15,7 @@ import pytest
 
 from ident import __version__
 from ident.store import _commit, commit, digest
-from sim.database import column_order, read_rows, versions
+from sim.database import column_order, correlation_pairs, read_rows, versions
 from sim.errors import InputError
 
 
@@ -165,7 +165,7 @@ def test_commit_returns_its_own_version_when_another_follows_at_once(few, db, mo
 LOOP = """
 import sys
 from ident.store import commit
-from sim.database import read_rows
+from sim.database import correlation_pairs, read_rows
 path = sys.argv[1]
 rows, _ = read_rows(path)
 print("ready", flush=True)
@@ -177,7 +177,7 @@ for k in range(10_000):
 ROUNDS = """
 import sys
 from ident.store import commit
-from sim.database import read_rows
+from sim.database import correlation_pairs, read_rows
 from sim.errors import InputError
 source, mine = sys.argv[1], float(sys.argv[2])
 rows, _ = read_rows(source)
@@ -275,3 +275,23 @@ def test_two_writers_that_create_the_database_at_once(two_writers, few, tmp_path
         assert len(back) == len(few), f"the database holds the rows of both: {said}"
         assert sorted(int(s.split()[1]) for s in done) == [v.number for v in history]
         assert digest(back) == history[-1].digest
+
+
+def test_database_keeps_the_covariance_of_the_identification(identification, rows):
+    """stderr and correlation of the rows give the covariance of the estimates back."""
+    known = rows[rows["estimate"] >= 0].drop_duplicates("estimate").set_index("estimate")
+    stderr = known["stderr"].reindex(range(len(identification.values))).to_numpy()
+    assert stderr == pytest.approx(np.sqrt(np.diag(identification.covariance)), rel=1e-10)
+    matrix = np.diag(stderr**2)
+    for i, text in known["correlation"].items():
+        for j, coefficient in correlation_pairs(text).items():
+            matrix[i, j] = coefficient * stderr[i] * stderr[j]
+    scale = np.outer(stderr, stderr)
+    assert np.abs(matrix - identification.covariance).max() > 0.0
+    assert (np.abs(matrix - identification.covariance) <= 2e-6 * scale).all()
+
+
+def test_rows_of_one_estimate_are_one_value_up_to_its_sign(rows):
+    for _, group in rows[rows["estimate"] >= 0].groupby("estimate"):
+        assert group["value"].abs().nunique() == 1
+        assert group["stderr"].nunique() == 1
