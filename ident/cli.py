@@ -108,6 +108,8 @@ def fit(folder: Path, db: str, message: str, json_path: str | None) -> None:
 @OUT
 @click.option("--json", "json_path", default=None, metavar="PATH|-", help="Write the comparison as JSON.")
 @click.option("--strict", is_flag=True, help="Exit 1 when a tolerance of a case file is missed.")
+@click.option("--samples", type=click.IntRange(min=2), default=None, help="Draw so many coefficient sets; error bands.")
+@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Seed of the draws.")
 def validate(
     case: str | None,
     every: bool,
@@ -117,11 +119,14 @@ def validate(
     out: Path,
     json_path: str | None,
     strict: bool,
+    samples: int | None,
+    seed: int,
 ) -> None:
     """Fly a maneuver from the database and compare it with its references.
 
     \b
     Example: ident validate --case hzz20 --json -
+             ident validate --case hzz20 --samples 1000
              ident validate --all
     """
     from sim.errors import InputError
@@ -129,6 +134,8 @@ def validate(
 
     if (case is None) == (not every):
         raise click.UsageError("give either --case NAME or --all")
+    if every and samples:
+        raise click.UsageError("--samples goes with --case")
     if out.exists() and not out.is_dir():
         raise InputError(str(out), "a file", "a folder for the figures")
     console = _console(quiet=json_path == "-")
@@ -138,8 +145,9 @@ def validate(
         raise InputError(f"case {case or 'of --all'}", str(error), "a state the boat can hold") from error
     from ident.figures import case_figure
 
+    bands = _bands(done[0], result, samples, seed, console) if samples else None
     for one in done:
-        figure = case_figure(one, out / f"{one.case.name}_v{one.result['database']['version']}.png")
+        figure = case_figure(one, out / f"{one.case.name}_v{one.result['database']['version']}.png", bands)
         console.print(f"figure: {figure}", highlight=False)
     if json_path:
         _emit(result, json_path)
@@ -154,6 +162,20 @@ def _one(case: str, db: str, version: int | None, console: Any) -> tuple[list[An
         done = validate(case, db, version)
     show(done, console)
     return [done], done.result
+
+
+def _bands(one: Any, result: dict[str, Any], samples: int, seed: int, console: Any) -> Any:
+    """Fly the samples with a progress bar; adds ``bands`` to the result and prints it."""
+    from rich.progress import Progress
+
+    from ident.bands import fly_samples, show, summary
+
+    with Progress(console=console, transient=True) as progress:
+        task = progress.add_task("flying samples", total=samples)
+        found = fly_samples(one.case, one.vehicle, one.rows, samples, seed, each=lambda: progress.advance(task))
+    result["bands"] = summary(found, one.case, one.reference)
+    show(result["bands"], console)
+    return found
 
 
 def _all(db: str, version: int | None, cases: Path | None, console: Any) -> tuple[list[Any], dict[str, Any]]:

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ident.bands import Bands
 from ident.validate import Validation
 from sim.simulate import CHANNELS
 
@@ -36,13 +37,14 @@ def _shown(channel: str, values: np.ndarray, unit: str) -> tuple[np.ndarray, str
     return values, unit
 
 
-def case_figure(done: Validation, path: Path) -> Path:
+def case_figure(done: Validation, path: Path, bands: Bands | None = None) -> Path:
     """Draw the simulated channels over the references.
 
     Parameters
     ----------
     done : A flown case.
     path : File to write; the suffix chooses the format.
+    bands : Flown samples, drawn as 50 and 95 % bands.
 
     Returns
     -------
@@ -71,6 +73,10 @@ def case_figure(done: Validation, path: Path) -> Path:
                 colour, marker = _STYLE.get(str(source), ("tab:gray", "^"))
                 axis.plot(time, values, color=colour, marker=marker, ms=2.5, lw=0.6, markevery=4, label=source)
         values, unit = _shown(channel, done.simulation[channel], CHANNELS[channel])
+        if bands:
+            for level, alpha in (("95", 0.15), ("50", 0.3)):
+                low, high = (_shown(channel, edge, CHANNELS[channel])[0] for edge in bands.band(channel, level))
+                axis.fill_between(bands.time, low, high, color="tab:red", alpha=alpha, lw=0, label=f"{level} % band")
         axis.plot(done.simulation["t"], values, color="tab:red", lw=1.6, label="simulated from the database")
         axis.set_ylabel(f"{_LABELS.get(channel, channel)} [{unit}]")
         axis.grid(alpha=0.3)

@@ -18,9 +18,10 @@ from sim.database import axis_columns, read_rows, versions
 from sim.errors import InputError
 from sim.forces import boat_features, plane_features
 from sim.simulate import CHANNELS, Simulation, simulate
-from sim.vehicle import load_vehicle
+from sim.vehicle import Vehicle, load_vehicle
 
 if TYPE_CHECKING:
+    import pandas as pd
     from rich.console import Console
 
 Array = NDArray[np.float64]
@@ -38,6 +39,7 @@ class Validation:
     case, simulation, reference : What was flown and what it is held against.
     result : The JSON object of the comparison.
     constant_axes : Term -> axes along which it was measured at one value only.
+    vehicle, rows : What was flown.
     """
 
     case: Case
@@ -45,6 +47,8 @@ class Validation:
     reference: Series
     result: dict[str, Any]
     constant_axes: dict[str, list[str]]
+    vehicle: Vehicle
+    rows: pd.DataFrame
 
 
 def rmse(simulation: Simulation, channel: str, series: tuple[Array, Array, str]) -> float:
@@ -264,7 +268,7 @@ def validate(name: str, db: str, version: int | None = None) -> Validation:
         "outside_tables": outside,
         "passed": bool(complete and _passed(case, errors)),
     }
-    return Validation(case, simulation, reference, result, constant)
+    return Validation(case, simulation, reference, result, constant, vehicle, rows)
 
 
 def _number(value: float | None, digits: int = 4) -> str:

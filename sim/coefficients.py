@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from copy import copy
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -52,10 +53,12 @@ class Coefficients:
 
     def __init__(self, vehicle: Vehicle, rows: pd.DataFrame) -> None:
         self.vehicle = vehicle
+        self._rows: dict[tuple[str, str], NDArray[np.int64]] = {}
         columns = {axis: column for column, axis in axis_columns().items()}
         known = {t.name: t for t in vehicle_terms(vehicle)}
         self._all: dict[tuple[str, str], Coefficient] = {}
-        for key, group in rows.groupby(["coefficient", "part"], sort=False):
+        places = rows.reset_index(drop=True).groupby(["coefficient", "part"], sort=False)
+        for key, group in places:
             name, part = (str(k) for k in key)
             if name not in known:
                 raise catalogue.CatalogueError(f"{vehicle.name}: {name!r} is not a term of its set")
@@ -67,10 +70,22 @@ class Coefficients:
             ).reshape(len(group), len(used))
             rules = tuple(term.extrapolation[a] for a in term.axes)
             values = group["value"].to_numpy(dtype=float)
+            self._rows[name, part] = group.index.to_numpy(dtype=np.int64)
             self._all[name, part] = Coefficient(term, part, Table(term.axes, rules, points), values)
 
     def __iter__(self) -> Iterator[Coefficient]:
         return iter(self._all.values())
+
+    def with_values(self, values: Array) -> Coefficients:
+        """The same tables with other values.
+
+        Parameters
+        ----------
+        values : One value a database row, in the order of the rows this was made from.
+        """
+        other = copy(self)
+        other._all = {k: replace(c, values=values[self._rows[k]]) for k, c in self._all.items()}
+        return other
 
     def get(self, name: str, part: str | None = None) -> Coefficient | None:
         """A coefficient by symbol (and part, for sections), or None when it is absent."""

@@ -1,0 +1,89 @@
+"""Error bands: draws with the stored covariance, flights that do not depend on workers."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from ident.bands import covariance, draw, fly_samples, inside, variance_shares
+from sim.case import load_case, load_reference
+from sim.coefficients import Coefficients
+from sim.simulate import simulate
+
+
+@pytest.fixture(scope="module")
+def short_case():
+    case, where = load_case("vzz10-10kt")
+    return case.model_copy(update={"run": case.run.model_copy(update={"duration_s": 30.0})}), where
+
+
+def test_draws_have_the_stored_covariance(rows):
+    """Sample variances and the correlations of the database, to their sampling error."""
+    estimates, correlation = covariance(rows)
+    drawn = draw(correlation, 4000, seed=3)
+    assert drawn.shape == (4000, len(estimates))
+    assert np.abs(drawn.std(axis=0) - 1.0).max() < 0.06
+    pairs = np.argwhere(np.triu(np.abs(correlation), 1) > 0.1)
+    assert len(pairs) > 50
+    found = np.array([np.corrcoef(drawn[:, i], drawn[:, j])[0, 1] for i, j in pairs])
+    assert np.abs(found - correlation[pairs[:, 0], pairs[:, 1]]).max() < 5.0 / np.sqrt(4000)
+
+
+def test_a_sample_does_not_depend_on_how_many_are_drawn(rows):
+    _, correlation = covariance(rows)
+    assert np.array_equal(draw(correlation, 5, seed=1), draw(correlation, 9, seed=1)[:5])
+    assert not np.array_equal(draw(correlation, 5, seed=1), draw(correlation, 5, seed=2))
+
+
+def test_bands_do_not_depend_on_the_number_of_workers(short_case, campaign, rows):
+    one, two = (fly_samples(short_case[0], campaign.vehicle, rows, 6, seed=1, workers=n) for n in (1, 2))
+    for channel, values in one.channels.items():
+        assert np.array_equal(values, two.channels[channel], equal_nan=True), channel
+
+
+def test_without_errors_every_sample_is_the_single_run(short_case, campaign, rows):
+    exact = rows.assign(stderr=0.0)
+    bands = fly_samples(short_case[0], campaign.vehicle, exact, 3)
+    single = simulate(short_case[0], Coefficients(campaign.vehicle, rows))
+    for channel in ("theta", "q", "u", "z"):
+        for sample in bands.channels[channel]:
+            assert sample == pytest.approx(single[channel], rel=1e-12, abs=1e-12)
+
+
+def test_a_drawn_boat_is_port_starboard_symmetric(campaign, rows):
+    """Rows of one estimate move together: Y, K and N stay odd in beta."""
+    estimates, correlation = covariance(rows)
+    step = draw(correlation, 1, seed=5)[0]
+    place = dict(zip(estimates["estimate"], range(len(estimates)), strict=True))
+    base = Coefficients(campaign.vehicle, rows)
+    from ident.bands import _row_steps
+
+    index, signed = _row_steps(rows, estimates)
+    moved = rows["value"].to_numpy() + np.where(index >= 0, step[index] * signed, 0.0)
+    assert len(place) == len(estimates)
+    drawn = base.with_values(moved)
+    for name in ("Y_uvw", "K_uvw", "N_uvw"):
+        table = drawn.get(name)
+        there, mirrored = (table.at([5.0, 0.0, side * 0.15, 10.0]) for side in (1.0, -1.0))
+        assert there == pytest.approx(-mirrored, rel=1e-12)
+        assert there != pytest.approx(base.get(name).at([5.0, 0.0, 0.15, 10.0]), rel=1e-6)
+
+
+def test_variance_shares_name_the_only_uncertain_coefficient(short_case, campaign, rows):
+    alone = rows.assign(stderr=rows["stderr"].where(rows["coefficient"] == "M_uq", 0.0))
+    bands = fly_samples(short_case[0], campaign.vehicle, alone, 40)
+    shares = variance_shares(bands, "theta")
+    assert shares[0]["coefficient"] == "M_uq"
+    assert shares[0]["share"] > 2.0 * sum(s["share"] for s in shares[1:2])
+
+
+def test_reference_made_of_the_middle_of_the_band_lies_inside(short_case, campaign, rows):
+    case, where = short_case
+    bands = fly_samples(case, campaign.vehicle, rows, 12)
+    reference = load_reference(case, where)
+    middle = np.degrees(np.median(bands.channels["theta"], axis=0))
+    reference.data["CFD"]["theta"] = (bands.time, middle, "deg")
+    reference.data["CFD"]["q"] = (bands.time, np.full(bands.time.size, 9.0), "rad/s")
+    found = inside(bands, case, reference)["CFD"]
+    assert found["theta"] == {"50": 1.0, "95": 1.0}
+    assert found["q"] == {"50": 0.0, "95": 0.0}
