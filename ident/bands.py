@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from sim.case import Case, Series
+from sim.case import Case, Series, in_radians
 from sim.coefficients import Coefficients
 from sim.database import correlation_pairs
 from sim.errors import InputError
@@ -170,7 +170,7 @@ def inside(bands: Bands, case: Case, reference: Series) -> dict[str, Any]:
             if channel not in reference[source]:
                 continue
             time, value, unit = reference[source][channel]
-            value = np.radians(value) if unit.startswith("deg") else value
+            value = in_radians(value, unit)
             entry = {}
             for level in LEVELS:
                 low, high = (np.interp(time, bands.time, edge) for edge in bands.band(channel, level))

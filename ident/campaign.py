@@ -17,16 +17,17 @@ from typing import Annotated, Literal
 
 import numpy as np
 import pandas as pd
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import Field
 
-from sim.catalogue import OUTPUTS
-from sim.errors import InputError, explain
-from sim.frames import Frame, FrameError
+from sim.catalogue import ACCELERATIONS, OUTPUTS
+from sim.errors import InputError
+from sim.frames import Frame
+from sim.schema import Data, FrameData, checked
 from sim.vehicle import Vehicle, load_vehicle
 
 TEXT = ("run_id", "test", "part", "quality", "source", "copy_of", "exclude", "reason", "decoupled")
 REQUIRED = ("run_id", "test", "part", "quality", "source")
-MOTION = ("p", "q", "r", "udot", "vdot", "wdot", "pdot", "qdot", "rdot")
+MOTION = ("p", "q", "r", *ACCELERATIONS)
 DIRECT = ("KT", "KQ", "t")
 
 # Larger numbers are slips of the pen, and their powers leave the floating-point range.
@@ -35,20 +36,13 @@ _LARGEST = 1e15
 _ACROSS = 0.5
 
 
-class _Part(BaseModel):
-    model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
-
-
-class CampaignFrame(_Part):
+class CampaignFrame(FrameData):
     """Axis directions of the loads and rates, and the sign convention of the angles."""
 
-    x: str
-    y: str
-    z: str
     angles: Literal["flight"]
 
 
-class MomentPoint(_Part):
+class MomentPoint(Data):
     """Point the moments are about, from the vehicle's origin, in the campaign frame."""
 
     x_m: float
@@ -57,41 +51,41 @@ class MomentPoint(_Part):
     about: str
 
 
-class Scale(_Part):
+class Scale(Data):
     """Linear scale ratio (ship over model) and the length of the tested body."""
 
     ratio: Annotated[float, Field(gt=0, le=1e4)]
     length_m: Annotated[float, Field(gt=0, le=1e4)]
 
 
-class Fluid(_Part):
+class Fluid(Data):
     """Water density of the tests."""
 
     density_kgpm3: Annotated[float, Field(gt=0, le=1e5)]
     source: str
 
 
-class Inertia(_Part):
+class Inertia(Data):
     """Whether accelerated loads contain the model's own inertia (they must not)."""
 
     model_inertia_in_loads: Literal[False]
 
 
-class Uncertainty(_Part):
+class Uncertainty(Data):
     """Rule for the standard error of a load."""
 
     floor: Annotated[float, Field(ge=0, le=1)]
     source: str
 
 
-class Quality(_Part):
+class Quality(Data):
     """A word of the quality vocabulary: factor on the standard error, and its meaning."""
 
     factor: Annotated[float, Field(ge=1, le=1e6)]
     meaning: str
 
 
-class CampaignFile(_Part):
+class CampaignFile(Data):
     """Schema of ``campaign.toml``."""
 
     name: str
@@ -153,11 +147,10 @@ def _read_header(folder: Path) -> tuple[CampaignFile, bytes]:
         raise InputError(str(path), "missing", "a campaign folder holds campaign.toml and one CSV a test")
     raw = path.read_bytes()
     try:
-        return CampaignFile.model_validate(tomllib.loads(raw.decode("utf-8"))), raw
-    except ValidationError as error:
-        raise explain(str(path), error) from error
+        data = tomllib.loads(raw.decode("utf-8"))
     except (ValueError, RecursionError) as error:
         raise InputError(str(path), f"not TOML: {error}", "a TOML file in UTF-8") from error
+    return checked(CampaignFile, data, str(path)), raw
 
 
 def _cells(path: Path) -> pd.DataFrame:
@@ -359,12 +352,8 @@ def read_campaign(folder: Path) -> Campaign:
         quality word, text or a non-finite number, an undeclared or left-handed frame.
     """
     header, raw = _read_header(folder)
-    reference = folder / header.vehicle
-    vehicle = load_vehicle(reference if header.vehicle.endswith(".toml") else header.vehicle)
-    try:
-        frame = Frame(header.frame.x, header.frame.y, header.frame.z)
-    except FrameError as error:
-        raise InputError(f"{folder / 'campaign.toml'}, [frame]", str(error), "a right-handed frame") from error
+    vehicle = load_vehicle(header.vehicle, beside=folder / "campaign.toml")
+    frame = header.frame.declared(f"{folder / 'campaign.toml'}, [frame]")
     paths = sorted(folder.glob("*.csv"))
     if not paths:
         raise InputError(str(folder), "no CSV file of runs", "one CSV a test beside campaign.toml")

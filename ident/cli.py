@@ -236,8 +236,8 @@ def stability(
     from sim.model import Environment
     from sim.vehicle import load_vehicle
 
-    data, _ = load_case(case)
-    vehicle = load_vehicle(data.vehicle)
+    data, where = load_case(case)
+    vehicle = load_vehicle(data.vehicle, beside=where)
     rows, number = read_rows(db, version, vehicle.name)
     drift = rows[rows["output"].eq("N") & rows["beta_deg"].notna()]
     speeds = speeds or tuple(sorted(drift["speed_mps"].dropna().unique())) or (data.initial.speed_mps,)

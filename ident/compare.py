@@ -11,8 +11,6 @@ from sim.errors import InputError
 if TYPE_CHECKING:
     import pandas as pd
 
-FORMATS = ("parquet", "csv", "json")
-
 
 def _indexed(rows: pd.DataFrame) -> pd.DataFrame:
     keys = ["vehicle", "coefficient", "part", *axis_columns()]

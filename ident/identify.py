@@ -24,7 +24,7 @@ from ident.campaign import DIRECT, Campaign, tests
 from ident.least_squares import gain_matrix, weights
 from ident.nodes import Node, key_point, table_points
 from ident.wake import wake_fraction
-from sim.catalogue import OUTPUTS, Term
+from sim.catalogue import ACCELERATIONS, OUTPUTS, Term
 from sim.forces import axis_values, boat_features, body_velocity, multiplier, plane_features
 from sim.parts import Mirror, Point, mirror_of, parts_of, vehicle_terms
 from sim.tables import Table
@@ -87,6 +87,10 @@ class Solver:
             (t.name, part): mirror_of(t, part, self.vehicle) for t in self.terms for part in parts_of(t, self.vehicle)
         }
         self.order = {k: i for i, k in enumerate(self.mirrors)}
+        self.loading: dict[tuple[str, str], list[Term]] = {}
+        for name, part in self.mirrors:
+            term = self.by_name[name]
+            self.loading.setdefault((term.output, part), []).append(term)
         self.nodes: list[Node] = []
         self.index: dict[tuple[str, str, Point], int] = {}
         self.values: Array = np.zeros(0)
@@ -158,16 +162,14 @@ class Solver:
         found = boat_features(velocity, rates, float(run["D0"]), float(run["n"]), float(run["J"]))
         if run["part"] in self.planes:
             found |= plane_features(self.planes[run["part"]], velocity, rates, zero["plane"])
-        for name in ("udot", "vdot", "wdot", "pdot", "qdot", "rdot"):
+        for name in ACCELERATIONS:
             found[name] = 0.0 if pd.isna(run[name]) else float(run[name])
         return found
 
     def active(self, run: pd.Series, output: str, features: dict[str, float]) -> list[tuple[Term, float]]:
         """Terms of the run's part that load this output in this state."""
         found = []
-        for term in self.terms:
-            if term.output != output or run["part"] not in parts_of(term, self.vehicle):
-                continue
+        for term in self.loading.get((output, run["part"]), []):
             m = multiplier(term, features)
             if m != 0.0 and not math.isnan(m):
                 found.append((term, m))

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ident.validate import Validation, validate
-from sim.database import read_rows, versions
+from sim.database import find_version
 from sim.errors import InputError
 from sim.vehicle import bundled
 
@@ -70,17 +70,16 @@ def run_all(
         As ``ident.validate.validate``.
     """
     names = case_names(folder)
-    number = read_rows(db, version)[1]
-    record = next(v for v in versions(db) if v.number == number)
+    record = find_version(db, version)
     trained = json.loads(record.metadata.get("trained", "[]"))
     flown, cases = [], []
     for name in names:
         each(name)
-        done = validate(name, db, number)
+        done = validate(name, db, record.number)
         flown.append(done)
         cases.append({**done.result, "trained": done.case.name in trained})
     board = {
-        "database": {"path": db, "version": number, "digest": record.digest},
+        "database": {"path": db, "version": record.number, "digest": record.digest},
         "cases": cases,
         "geometric_mean_ratio": {
             "trained": _mean_ratio([c for c in cases if c["trained"]]),

@@ -5,16 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ident.metrics import roll_decay, zigzag
-from sim.case import Case, Series, load_case, load_reference
+from sim.case import Case, Series, in_radians, load_case, load_reference
 from sim.coefficients import Coefficient, Coefficients
-from sim.database import axis_columns, read_rows, versions
+from sim.database import axis_columns, find_version, read_rows
 from sim.errors import InputError
 from sim.forces import boat_features, plane_features
 from sim.simulate import CHANNELS, Simulation, simulate
@@ -153,7 +152,7 @@ def _side_by_side(
         if angle not in series:
             continue
         time, value, unit = series[angle]
-        value = np.radians(value) if unit.startswith("deg") else value
+        value = in_radians(value, unit)
         turn = series[rate][:2] if rate and rate in series else None
         label = "published_model" if case.reference and source == case.reference.published_model else str(source)
         columns[label] = measure(time, value, turn) if rate else measure(time, value)
@@ -249,20 +248,16 @@ def validate(name: str, db: str, version: int | None = None) -> Validation:
     case, where = load_case(name)
     reference = load_reference(case, where)
     check_reference(case, reference, where)
-    vehicle_name: str | Path = case.vehicle
-    if case.vehicle.endswith(".toml"):
-        vehicle_name = Path(where).parent / case.vehicle
-    vehicle = load_vehicle(vehicle_name)
+    vehicle = load_vehicle(case.vehicle, beside=where)
     rows, number = read_rows(db, version, vehicle.name)
     coefficients = Coefficients(vehicle, rows)
     simulation = simulate(case, coefficients)
     errors = _errors(case, simulation, reference)
     outside, constant = _outside(simulation, coefficients)
-    record = next(v for v in versions(db) if v.number == number)
     complete = simulation["t"][-1] >= case.run.duration_s - case.run.record_s
     result = {
         "case": case.name,
-        "database": {"path": db, "version": number, "digest": record.digest},
+        "database": {"path": db, "version": number, "digest": find_version(db, number).digest},
         "references": errors,
         "metrics": _metrics(case, simulation, reference),
         "outside_tables": outside,

@@ -58,8 +58,8 @@ def main(db: str, name: str, tries: int) -> None:
     Example: python -m sim.bench --db coeff_db
     """
     try:
-        case, _ = load_case(name)
-        vehicle = load_vehicle(case.vehicle)
+        case, where = load_case(name)
+        vehicle = load_vehicle(case.vehicle, beside=where)
         rows, version = read_rows(db, vehicle=vehicle.name)
     except InputError as error:
         raise click.UsageError(str(error)) from error

@@ -9,10 +9,10 @@ from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import Field, model_validator
 
-from sim.errors import InputError, explain
-from sim.frames import Frame, FrameError
+from sim.errors import InputError
+from sim.schema import Data, FrameData, checked
 from sim.vehicle import bundled, read_toml
 
 Array = NDArray[np.float64]
@@ -22,18 +22,14 @@ Positive = Annotated[float, Field(gt=0)]
 _MOST_STEPS = 1e7
 
 
-class _Data(BaseModel):
-    model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
-
-
-class EnvironmentData(_Data):
+class EnvironmentData(Data):
     """Water density and gravity."""
 
     density_kgpm3: Positive
     gravity_mps2: Positive
 
 
-class Initial(_Data):
+class Initial(Data):
     """Initial state: solved self-propulsion, or the given speed as it is."""
 
     state: Literal["self_propulsion", "as_given"]
@@ -50,7 +46,7 @@ class Initial(_Data):
         return self
 
 
-class Run(_Data):
+class Run(Data):
     """Duration, control sample (and integration step), and time between records."""
 
     duration_s: Annotated[float, Field(gt=0, le=1e5)]
@@ -66,7 +62,7 @@ class Run(_Data):
         return self
 
 
-class PlaneCommand(_Data):
+class PlaneCommand(Data):
     """Law of dV or dH. Gains in degrees and metres, positive when they steer back."""
 
     law: Literal["fixed", "pid", "zigzag"]
@@ -99,7 +95,7 @@ class PlaneCommand(_Data):
         return first + [getattr(self, f"{k}_{angle}") for k in "PID"]
 
 
-class SpeedCommand(_Data):
+class SpeedCommand(Data):
     """Law of the revolutions: fixed at the initial value, or PID on the speed."""
 
     law: Literal["fixed", "pid"]
@@ -108,7 +104,7 @@ class SpeedCommand(_Data):
     D_u: float = 0.0
 
 
-class Commands(_Data):
+class Commands(Data):
     """Laws of the vertical and horizontal command and of the revolutions."""
 
     dV: PlaneCommand
@@ -122,15 +118,7 @@ class Commands(_Data):
         return self
 
 
-class FrameData(_Data):
-    """Axis directions of the reference data."""
-
-    x: str
-    y: str
-    z: str
-
-
-class Reference(_Data):
+class Reference(Data):
     """Where the reference series are and what to compare with them."""
 
     file: str
@@ -140,7 +128,7 @@ class Reference(_Data):
     frame: FrameData
 
 
-class Tolerance(_Data):
+class Tolerance(Data):
     """Largest accepted RMSE of one channel against one source."""
 
     source: str
@@ -149,7 +137,7 @@ class Tolerance(_Data):
     unit: str
 
 
-class Case(_Data):
+class Case(Data):
     """A maneuver case file."""
 
     name: str
@@ -162,7 +150,7 @@ class Case(_Data):
     run: Run
     command: Commands
     reference: Reference | None = None
-    tolerance: list[Tolerance] = []
+    tolerance: list[Tolerance] = Field(default_factory=list)
 
 
 class Series:
@@ -178,6 +166,11 @@ class Series:
         return self.data.get(source, {})
 
 
+def in_radians(value: Array, unit: str) -> Array:
+    """Values of a reference series in the simulation's unit: degrees become radians."""
+    return np.radians(value) if unit.startswith("deg") else value
+
+
 def load_case(name: str | Path) -> tuple[Case, str]:
     """A bundled case or a path to one.
 
@@ -191,10 +184,7 @@ def load_case(name: str | Path) -> tuple[Case, str]:
         For a missing file, a missing or unknown key, or a value out of range.
     """
     data, where = read_toml(name, "cases")
-    try:
-        return Case.model_validate(data), where
-    except ValidationError as error:
-        raise explain(where, error) from error
+    return checked(Case, data, where), where
 
 
 def load_reference(case: Case, where: str) -> Series:
@@ -220,10 +210,7 @@ def load_reference(case: Case, where: str) -> Series:
         path = Path(where).parent / case.reference.file
     if not path.is_file():
         raise InputError(str(path), "missing", f"the reference file of case {case.name}")
-    try:
-        frame = Frame(**case.reference.frame.model_dump())
-    except FrameError as error:
-        raise InputError(f"{where}, key reference.frame", str(error), "a right-handed frame") from error
+    frame = case.reference.frame.declared(f"{where}, key reference.frame")
     table = pd.read_csv(path, dtype={"source": str, "channel": str, "unit": str})
     for column in ("source", "channel", "t", "value", "unit"):
         if column not in table:

@@ -156,3 +156,15 @@ def versions(path: str) -> list[Version]:
         stamp = entry.get("timestamp", "")
         found.append(Version(int(entry["version"]), str(stamp), metadata))
     return sorted(found, key=lambda v: v.number)
+
+
+def find_version(path: str, number: int | None = None) -> Version:
+    """One version of a database, the latest when ``number`` is None.
+
+    Raises
+    ------
+    InputError
+        When there is no database there, or no such version.
+    """
+    number = int(open_table(path, number).version())
+    return next(v for v in versions(path) if v.number == number)

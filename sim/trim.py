@@ -36,9 +36,7 @@ class Trim:
     residual: float
 
 
-def self_propulsion(
-    model: kernel.Model, mixer: Array, speed: float, depth: float, plane_limit: Array, guess: float = 0.0
-) -> Trim:
+def self_propulsion(model: kernel.Model, mixer: Array, speed: float, depth: float, plane_limit: Array) -> Trim:
     """Solve revolutions, plane commands, pitch, heel and drift for straight level flight.
 
     Parameters
@@ -48,7 +46,6 @@ def self_propulsion(
     speed : Speed through the water [m/s].
     depth : D0, depth of the sail top [m].
     plane_limit : (planes,) [rad].
-    guess : First guess of n [1/s]; by default U / D, an advance coefficient near one.
 
     Raises
     ------
@@ -57,8 +54,9 @@ def self_propulsion(
     """
     work = kernel.workspace(mixer.shape[0])
     derivative = np.zeros(12)
-    # Unknowns: n relative to U/D, pitch, dV, heel, drift, dH; earth velocity is horizontal.
-    reference = guess or speed / model.diameter
+    # Unknowns: n relative to U/D (an advance coefficient near one), pitch, dV, heel, drift,
+    # dH; earth velocity is horizontal.
+    reference = speed / model.diameter
 
     def build(x: Array) -> tuple[Array, Array]:
         n, pitch, dv, heel, drift, dh = x

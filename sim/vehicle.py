@@ -8,19 +8,16 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
+from pydantic import Field, field_validator
 
-from sim.errors import InputError, explain
-from sim.frames import Frame, FrameError
+from sim.errors import InputError
+from sim.frames import PROGRAM, Frame
+from sim.schema import Data, FrameData, checked
 
 Vector = Annotated[list[float], Field(min_length=3, max_length=3)]
 
 
-class _Data(BaseModel):
-    model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
-
-
-class Number(_Data):
+class Number(Data):
     """A number with its unit and where it comes from."""
 
     value: float
@@ -28,7 +25,7 @@ class Number(_Data):
     source: str
 
 
-class Triple(_Data):
+class Triple(Data):
     """A vector with its unit and where it comes from."""
 
     value: Vector
@@ -36,7 +33,7 @@ class Triple(_Data):
     source: str
 
 
-class Limits(_Data):
+class Limits(Data):
     """A lower and an upper limit with unit and source."""
 
     value: Annotated[list[float], Field(min_length=2, max_length=2)]
@@ -44,7 +41,7 @@ class Limits(_Data):
     source: str
 
 
-class Particulars(_Data):
+class Particulars(Data):
     """Mass, inertia and reference points; positions from the body origin."""
 
     length: Number
@@ -56,7 +53,7 @@ class Particulars(_Data):
     sail_top: Triple
 
 
-class Propeller(_Data):
+class Propeller(Data):
     """Propeller diameter and the limits of its revolutions."""
 
     name: str
@@ -65,14 +62,14 @@ class Propeller(_Data):
     rate: Number
 
 
-class Mixer(_Data):
+class Mixer(Data):
     """Share of the vertical and horizontal command in a plane's deflection, Eq. (1)."""
 
     dV: float
     dH: float
 
 
-class Plane(_Data):
+class Plane(Data):
     """One control plane: where it is, how it turns, what limits it."""
 
     name: str
@@ -93,35 +90,27 @@ class Plane(_Data):
         return normal / np.linalg.norm(normal)
 
 
-class Section(_Data):
+class Section(Data):
     """Centre of one added-mass section."""
 
     name: str
     position: Vector
 
 
-class Sections(_Data):
+class Sections(Data):
     """The added-mass sections of Table 6."""
 
     source: str
     centres: list[Section]
 
 
-class Axes(_Data):
+class Axes(FrameData):
     """Declared directions of the body axes and what the origin is."""
 
-    x: str
-    y: str
-    z: str
     origin: str
 
-    @property
-    def frame(self) -> Frame:
-        """The declared frame."""
-        return Frame(self.x, self.y, self.z)
 
-
-class Vehicle(_Data):
+class Vehicle(Data):
     """A vehicle file, turned to the program frame by ``load_vehicle``."""
 
     name: str
@@ -132,7 +121,7 @@ class Vehicle(_Data):
     frame: Axes
     particulars: Particulars
     propeller: Propeller
-    planes: list[Plane] = []
+    planes: list[Plane] = Field(default_factory=list)
     sections: Sections | None = None
 
     @field_validator("planes")
@@ -198,23 +187,21 @@ def read_toml(name: str | Path, kind: str) -> tuple[dict[str, Any], str]:
         raise InputError(str(path), f"not TOML: {error}", "a TOML file in UTF-8") from error
 
 
-def load_vehicle(name: str | Path = "bb2") -> Vehicle:
+def load_vehicle(name: str | Path = "bb2", beside: str | Path = "") -> Vehicle:
     """Read a vehicle and turn it to the program frame.
 
     Parameters
     ----------
     name : Bundled name or path to a vehicle file.
+    beside : File that names the vehicle; a path is relative to its folder.
 
     Raises
     ------
     InputError
         For a missing file, a missing or unknown key, or a value out of range.
     """
-    data, where = read_toml(name, "vehicles")
-    try:
-        vehicle = Vehicle.model_validate(data)
-        return vehicle.turned(Frame())
-    except ValidationError as error:
-        raise explain(where, error) from error
-    except FrameError as error:
-        raise InputError(where, str(error), "a right-handed frame") from error
+    path = Path(name)
+    data, where = read_toml(Path(beside).parent / path if path.suffix == ".toml" else name, "vehicles")
+    vehicle = checked(Vehicle, data, where)
+    vehicle.frame.declared(where)
+    return vehicle.turned(PROGRAM)
