@@ -63,7 +63,7 @@ def added_mass_matrix(coefficients: Coefficients, environment: Environment) -> A
     centres = {s.name: s.position for s in vehicle.sections.centres} if vehicle.sections else {}
     for coefficient in coefficients:
         term = coefficient.term
-        if not term.is_acceleration:
+        if not term.is_acceleration or (coefficient.part in centres) != (vehicle.added_mass == "sections"):
             continue
         load = term.scale(environment.density, length, diameter) * float(coefficient.values[0])
         i, j = OUTPUTS.index(term.output), ACCELERATIONS.index(term.factors[0])

@@ -16,10 +16,11 @@ Point = tuple[float, ...]
 def vehicle_terms(vehicle: Vehicle) -> tuple[Term, ...]:
     """The rows of the term table that apply to a vehicle.
 
-    Sections and whole-boat derivatives of added mass exclude each other; terms of planes
+    Whole-boat derivatives of added mass only where the vehicle takes its inertia from them;
+    sections only where it has some (they then carry wave loads alone). Terms of planes
     the vehicle does not have are left out.
     """
-    out_of_use = "added mass" if vehicle.added_mass == "sections" else "sectional added mass"
+    out_of_use = "added mass" if vehicle.added_mass == "sections" else ""
     planes = {p.name for p in vehicle.planes}
     return tuple(
         t
