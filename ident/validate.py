@@ -50,12 +50,12 @@ class Validation:
     rows: pd.DataFrame
 
 
-def rmse(simulation: Simulation, channel: str, series: tuple[Array, Array, str]) -> float:
-    """Root mean square difference at the reference's own times, in its unit."""
-    time, value, unit = series
+def rmse(simulation: Simulation, channel: str, series: tuple[Array, Array, str], abscissa: str = "t") -> float:
+    """Root mean square difference at the reference's own times or path lengths, in its unit."""
+    along, value, unit = series
     flown = simulation[channel]
     flown = np.degrees(flown) if unit.startswith("deg") else flown
-    return float(np.sqrt(np.mean((np.interp(time, simulation["t"], flown) - value) ** 2)))
+    return float(np.sqrt(np.mean((np.interp(along, simulation[abscissa], flown) - value) ** 2)))
 
 
 def check_reference(case: Case, reference: Series, where: str) -> None:
@@ -66,7 +66,7 @@ def check_reference(case: Case, reference: Series, where: str) -> None:
     InputError
         Naming the case file, what was found and what is allowed.
     """
-    if case.reference is None:
+    if case.reference is None or not reference.data:
         return
     named = {*case.reference.compare, *([case.reference.published_model] if case.reference.published_model else [])}
     for source in sorted(named - set(reference.data)):
@@ -83,35 +83,56 @@ def check_reference(case: Case, reference: Series, where: str) -> None:
             raise InputError(case.reference.file, text, " or ".join(sorted(allowed)))
 
 
-def _errors(case: Case, simulation: Simulation, reference: Series) -> dict[str, Any]:
-    if case.reference is None:
-        return {}
+def _published(published: dict[str, tuple[Array, Array, str]], channel: str, unit: str) -> tuple[Array, Array]:
+    """Abscissa and value of the published model in the reference's unit."""
+    along, value, own_unit = published[channel]
+    if own_unit != unit:
+        value = np.degrees(value) if unit.startswith("deg") else np.radians(value)
+    return along, value
+
+
+def _error(
+    simulation: Simulation, reference: Series, source: str, channel: str, published: dict[str, tuple[Array, Array, str]]
+) -> dict[str, Any]:
+    """Comparison of one channel with one source; numbers are None where the flight was too short."""
+    along, value, unit = reference[source][channel]
+    flown = along <= float(simulation[reference.abscissa][-1]) + 1e-9
+    entry: dict[str, Any] = {
+        "rmse": rmse(simulation, channel, (along[flown], value[flown], unit), reference.abscissa),
+        "unit": unit,
+        "n": int(flown.sum()),
+        "published_model_rmse": None,
+        "ratio": None,
+        "reference_sigma": None,
+    }
+    sigma = reference.sigma.get(source, {}).get(channel)
+    if sigma is not None:
+        entry["reference_sigma"] = float(np.sqrt(np.mean(sigma[flown] ** 2)))
+    if channel in published:
+        other_along, other = _published(published, channel, unit)
+        both = flown & (along >= other_along[0]) & (along <= other_along[-1])
+        if both.any():
+            gap = np.interp(along[both], other_along, other) - value[both]
+            entry["published_model_rmse"] = float(np.sqrt(np.mean(gap**2)))
+            entry["ratio"] = entry["rmse"] / entry["published_model_rmse"] if entry["published_model_rmse"] else None
+    return entry
+
+
+def _errors(
+    case: Case, simulation: Simulation, reference: Series, own: dict[str, Simulation] | None = None
+) -> dict[str, Any]:
+    """Errors by source and channel; ``own`` holds the runs from a source's own start."""
     found: dict[str, Any] = {}
-    end = float(simulation["t"][-1])
+    if case.reference is None:
+        return found
     published = reference[case.reference.published_model or ""]
     for source in case.reference.compare:
-        found[source] = {}
-        for channel in case.reference.channels:
-            if channel not in reference[source]:
-                continue
-            time, value, unit = reference[source][channel]
-            flown = time <= end + 1e-9
-            entry: dict[str, Any] = {
-                "rmse": rmse(simulation, channel, (time[flown], value[flown], unit)),
-                "unit": unit,
-                "n": int(flown.sum()),
-                "published_model_rmse": None,
-                "ratio": None,
-            }
-            if channel in published:
-                other_time, other, other_unit = published[channel]
-                if other_unit != unit:
-                    other = np.degrees(other) if unit.startswith("deg") else np.radians(other)
-                both = flown & (time <= other_time[-1])
-                gap = np.interp(time[both], other_time, other) - value[both]
-                entry["published_model_rmse"] = float(np.sqrt(np.mean(gap**2)))
-                entry["ratio"] = entry["rmse"] / entry["published_model_rmse"]
-            found[source][channel] = entry
+        flown = (own or {}).get(source, simulation)
+        found[source] = {
+            channel: _error(flown, reference, source, channel, published)
+            for channel in case.reference.channels
+            if channel in reference[source]
+        }
     return found
 
 

@@ -82,7 +82,9 @@ def rhs(m: kernel.Model, y: Array, c: Array) -> Array:
         lever = cross_matrix(tank)
         inertia = inertia - ballast * lever @ lever
         own = cross_matrix(moment)
-        inverse = np.linalg.inv(m.mass_matrix + np.block([[ballast * np.eye(3), -own], [own, -ballast * lever @ lever]]))
+        inverse = np.linalg.inv(
+            m.mass_matrix + np.block([[ballast * np.eye(3), -own], [own, -ballast * lever @ lever]])
+        )
         mass += ballast
         r_g, weight = (m.mass * r_g + moment) / mass, weight * mass / m.mass
     swing = np.cross(omega, v)
