@@ -80,7 +80,7 @@ def check_reference(case: Case, reference: Series, where: str) -> None:
             raise InputError(f"{where}, key reference.channels", repr(channel), "a channel of the reference file")
         for unit in sorted(units - allowed):
             text = f"{channel} in {unit!r}"
-            raise InputError(case.reference.file, text, " or ".join(sorted(allowed)))
+            raise InputError(case.reference.file or where, text, " or ".join(sorted(allowed)))
 
 
 def _published(published: dict[str, tuple[Array, Array, str]], channel: str, unit: str) -> tuple[Array, Array]:

@@ -23,8 +23,16 @@ Array = NDArray[np.float64]
 Positive = Annotated[float, Field(gt=0)]
 
 Maneuver = Literal[
-    *("turning_circle", "direct_spiral", "reverse_spiral", "pull_out", "stopping"),
-    *("meander", "depth_change", "course_keeping", "rise", "self_propulsion"),
+    "turning_circle",
+    "direct_spiral",
+    "reverse_spiral",
+    "pull_out",
+    "stopping",
+    "meander",
+    "depth_change",
+    "course_keeping",
+    "rise",
+    "self_propulsion",
 ]
 
 # A record of more steps than this does not fit a laptop's memory.

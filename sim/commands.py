@@ -264,7 +264,7 @@ def compile_programme(
     count = np.array([len(axis) for axis in rows], dtype=np.int64)
     return Programme(
         first=np.concatenate([[0], np.cumsum(count)[:-1]]),
-        count=count,
+        steps=count,
         mode=np.array([r[0] for r in flat], dtype=np.int64),
         value=np.array([r[1] for r in flat], dtype=float),
         shift=np.array([r[2] for r in flat], dtype=float).reshape(-1, 2),

@@ -23,7 +23,7 @@ N_AXES = 4
 class Programme(NamedTuple):
     """Steps of commands and the events that end them.
 
-    first, count : (4,) first step of each axis (dV, dH, n, run) and how many.
+    first, steps : (4,) first step of each axis (dV, dH, n, run) and how many.
     mode : (k,) law while the step lasts; value : (k,) fixed command [rad or 1/s].
     shift : (k, 2) move of the autopilot's targets: distance [m] and angle [rad], or the
         yaw rate to hold [rad/s].
@@ -31,7 +31,7 @@ class Programme(NamedTuple):
     """
 
     first: np.ndarray
-    count: np.ndarray
+    steps: np.ndarray
     mode: np.ndarray
     value: np.ndarray
     shift: np.ndarray
@@ -84,7 +84,7 @@ def _channel_rate(y: np.ndarray, dy: np.ndarray, event: np.ndarray) -> float:
 def step_past(p: Programme, run: Progress, axis: int, y: np.ndarray, t: float) -> float:
     """Not negative once an event of the present step of an axis has happened."""
     found = -1.0
-    if run.at[axis] >= p.count[axis]:
+    if run.at[axis] >= p.steps[axis]:
         return found
     k = p.first[axis] + run.at[axis]
     for e in range(p.event_first[k], p.event_first[k + 1]):
@@ -109,7 +109,7 @@ def step_past(p: Programme, run: Progress, axis: int, y: np.ndarray, t: float) -
 def watch(p: Programme, run: Progress, y: np.ndarray, dy: np.ndarray, t: float) -> None:
     """Note which channels are not steady at this sample."""
     for axis in range(N_AXES):
-        if run.at[axis] >= p.count[axis]:
+        if run.at[axis] >= p.steps[axis]:
             continue
         k = p.first[axis] + run.at[axis]
         for e in range(p.event_first[k], p.event_first[k + 1]):
@@ -120,7 +120,7 @@ def watch(p: Programme, run: Progress, y: np.ndarray, dy: np.ndarray, t: float) 
 @njit(cache=True, error_model="numpy")
 def advance(p: Programme, run: Progress, axis: int, y: np.ndarray, t: float) -> bool:
     """Go to the next step of an axis; false when there is none."""
-    if run.at[axis] + 1 >= p.count[axis]:
+    if run.at[axis] + 1 >= p.steps[axis]:
         return False
     run.at[axis] += 1
     run.since[axis] = t

@@ -127,7 +127,7 @@ def self_propulsion(
     NoEquilibrium
         When the six balances have no solution or a plane is beyond its limit.
     """
-    free = _LEVEL[level]
+    free: tuple[str, ...] = _LEVEL[level]
     values = {"pitch": 0.0, "dV": 0.0} | dict(zip(TANK_NAMES, held, strict=True))
     limits = dict(zip(TANK_NAMES, tank_limit or (np.inf, np.inf), strict=True))
     limited: tuple[str, ...] = ()
