@@ -113,6 +113,24 @@ class Reference(Data):
     initial: dict[str, Start] = Field(default_factory=dict)
 
 
+class Sweep(Data):
+    """Speeds and depths at which self-propulsion is solved, each with each."""
+
+    speed_mps: Annotated[list[Positive], Field(min_length=1)]
+    depth_m: Annotated[list[float], Field(min_length=1)]
+
+
+class Published(Data):
+    """A published value of one metric, and the relative deviation that is accepted."""
+
+    metric: str
+    source: str
+    value: float
+    unit: str
+    note: str
+    tolerance: Positive | None = None
+
+
 class Tolerance(Data):
     """Largest accepted RMSE of one channel against one source."""
 
@@ -135,7 +153,9 @@ class Case(Data):
     initial: Initial
     run: Run
     command: Commands
+    sweep: Sweep | None = None
     reference: Reference | None = None
+    published: list[Published] = Field(default_factory=list)
     tolerance: list[Tolerance] = Field(default_factory=list)
 
     def started_as(self, source: str) -> Case | None:

@@ -174,13 +174,14 @@ def settings_of(case: Case, vehicle: Vehicle, state: Array, controls: Array, tri
     )
 
 
-def simulate(case: Case, coefficients: Coefficients) -> Simulation:
+def simulate(case: Case, coefficients: Coefficients, model: Model | None = None) -> Simulation:
     """Fly a case.
 
     Parameters
     ----------
     case : From ``load_case``.
     coefficients : Of the case's vehicle.
+    model : What ``model_of`` gave for them, where it is flown more than once.
 
     Returns
     -------
@@ -194,7 +195,8 @@ def simulate(case: Case, coefficients: Coefficients) -> Simulation:
         When the case uses tanks that the vehicle does not have.
     """
     vehicle = coefficients.vehicle
-    model = model_of(case, coefficients)
+    if model is None:
+        model = model_of(case, coefficients)
     state, controls, trim = initial_state(case, vehicle, model)
     settings = settings_of(case, vehicle, state, controls, trim)
     dt = case.run.step_s
