@@ -98,9 +98,18 @@ def _published(published: dict[str, tuple[Array, Array, str]], channel: str, uni
 def _error(
     simulation: Simulation, reference: Series, source: str, channel: str, published: dict[str, tuple[Array, Array, str]]
 ) -> dict[str, Any]:
-    """Comparison of one channel with one source; numbers are None where the flight was too short."""
+    """Comparison of one channel with one source, as far as both go.
+
+    Raises
+    ------
+    InputError
+        When the reference begins after the run ends.
+    """
     along, value, unit = reference[source][channel]
     flown = along <= float(simulation[reference.abscissa][-1]) + 1e-9
+    if not flown.any():
+        end = f"the run ends at {simulation[reference.abscissa][-1]:.4g}"
+        raise InputError(f"reference {source} {channel}", f"begins at {reference.abscissa} = {along[0]:.4g}", end)
     entry: dict[str, Any] = {
         "rmse": rmse(simulation, channel, (along[flown], value[flown], unit), reference.abscissa),
         "unit": unit,
