@@ -16,7 +16,7 @@ from sim.case import Case, Series, in_radians
 from sim.coefficients import Coefficients
 from sim.database import correlation_pairs
 from sim.errors import InputError
-from sim.simulate import Simulation, simulate
+from sim.simulate import Simulation, model_of, simulate
 from sim.trim import NoEquilibrium
 from sim.vehicle import Vehicle
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
 Array = NDArray[np.float64]
-_DERIVED = ("U", "u_over_U0", "dz_over_L0")
+_DERIVED = ("U", "D0", "s", "u_over_U0", "dz_over_L0")
 LEVELS = {"50": (25.0, 75.0), "95": (2.5, 97.5)}
 
 
@@ -36,6 +36,7 @@ class Bands:
     ----------
     time : (rows,) record times [s].
     channels : Channel -> (samples, rows), NaN after a sample ended.
+    own : The same of the flights from the start of a source's record, by source.
     draws : (samples, estimates) what was drawn, in standard errors.
     estimates : Coefficient of each estimate.
     failed : Samples without a self-propulsion state.
@@ -44,14 +45,15 @@ class Bands:
 
     time: Array
     channels: dict[str, Array]
+    own: dict[str, dict[str, Array]]
     draws: Array
     estimates: list[str]
     failed: int
     seed: int
 
-    def band(self, channel: str, level: str) -> tuple[Array, Array]:
-        """Lower and upper edge of the 50 or 95 % band of a channel."""
-        low, high = np.nanpercentile(self.channels[channel], LEVELS[level], axis=0)
+    def band(self, channel: str, level: str, source: str = "") -> tuple[Array, Array]:
+        """Lower and upper edge of the 50 or 95 % band of a channel, as a source's record starts."""
+        low, high = np.nanpercentile(self.own.get(source, self.channels)[channel], LEVELS[level], axis=0)
         return np.asarray(low), np.asarray(high)
 
 
@@ -132,10 +134,14 @@ def fly_samples(
     base = Coefficients(vehicle, rows)
     value = rows["value"].to_numpy()
 
-    def one(i: int) -> Simulation | None:
-        moved = value + np.where(index >= 0, draws[i][index] * step, 0.0)
+    started = {s: case.started_as(s) for s in (case.reference.compare if case.reference else [])}
+    flights = {"": case} | {s: c for s, c in started.items() if c is not None}
+
+    def one(i: int) -> dict[str, Simulation] | None:
+        moved = base.with_values(value + np.where(index >= 0, draws[i][index] * step, 0.0))
         try:
-            return simulate(case, base.with_values(moved))
+            model = model_of(case, moved)
+            return {s: simulate(c, moved, model) for s, c in flights.items()}
         except NoEquilibrium:
             return None
         finally:
@@ -147,14 +153,21 @@ def fly_samples(
     if not kept:
         raise InputError(f"case {case.name}", "no sample has a self-propulsion state", "smaller errors or another case")
     done = [s for s in flown if s is not None]
-    time = max((s["t"] for s in done), key=len)
+    time = max((s["t"] for flown_from in done for s in flown_from.values()), key=len)
+    channels = {source: _stacked([s[source] for s in done], time) for source in flights}
+    own = {source: stack for source, stack in channels.items() if source}
+    return Bands(time, channels[""], own, draws[kept], list(estimates["coefficient"]), samples - len(kept), seed)
+
+
+def _stacked(flown: list[Simulation], time: Array) -> dict[str, Array]:
+    """Channel -> (samples, rows), NaN after a sample ended."""
     channels: dict[str, Array] = {}
-    for name in (*done[0].columns[1:], *_DERIVED):
-        stack = np.full((len(done), time.size), np.nan)
-        for row, simulation in zip(stack, done, strict=True):
+    for name in (*flown[0].columns[1:], *_DERIVED):
+        stack = np.full((len(flown), time.size), np.nan)
+        for row, simulation in zip(stack, flown, strict=True):
             row[: len(simulation.record)] = simulation[name]
         channels[name] = stack
-    return Bands(time, channels, draws[kept], list(estimates["coefficient"]), samples - len(kept), seed)
+    return channels
 
 
 def inside(bands: Bands, case: Case, reference: Series) -> dict[str, Any]:
@@ -170,10 +183,13 @@ def inside(bands: Bands, case: Case, reference: Series) -> dict[str, Any]:
             if channel not in reference[source]:
                 continue
             time, value, unit = reference[source][channel]
+            if reference.abscissa == "s":
+                # Path length to time by the median flight.
+                time = np.interp(time, np.nanmedian(bands.own.get(source, bands.channels)["s"], axis=0), bands.time)
             value = in_radians(value, unit)
             entry = {}
             for level in LEVELS:
-                low, high = (np.interp(time, bands.time, edge) for edge in bands.band(channel, level))
+                low, high = (np.interp(time, bands.time, edge) for edge in bands.band(channel, level, source))
                 entry[level] = float(np.mean((value >= low) & (value <= high)))
             found.setdefault(source, {})[channel] = entry
     return found

@@ -110,6 +110,19 @@ def fit(folder: Path, db: str, message: str, json_path: str | None) -> None:
 @click.option("--strict", is_flag=True, help="Exit 1 when a tolerance of a case file is missed.")
 @click.option("--samples", type=click.IntRange(min=2), default=None, help="Draw so many coefficient sets; error bands.")
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Seed of the draws.")
+@click.option("--vehicle", default=None, help="With --case: bundled vehicle or vehicle file, not the case's.")
+@click.option(
+    "--reference",
+    type=click.Path(path_type=Path),
+    default=None,
+    help="With --case: your own reference, a CSV of source, channel, t or s, value, unit, and sigma if known.",
+)
+@click.option(
+    "--frame",
+    type=click.Choice(["source", "program"]),
+    default=None,
+    help="Frame of --reference: source is x aft, z up; program x forward, z down. The case's by default.",
+)
 def validate(
     case: str | None,
     every: bool,
@@ -121,12 +134,15 @@ def validate(
     strict: bool,
     samples: int | None,
     seed: int,
+    **own: Any,
 ) -> None:
     """Fly a maneuver from the database and compare it with its references.
 
     \b
     Example: ident validate --case hzz20 --json -
              ident validate --case hzz20 --samples 1000
+             ident validate --case turn20-4m --reference mine.csv --frame program
+             ident validate --case turning-circle --vehicle my_boat.toml
              ident validate --all
     """
     from sim.errors import InputError
@@ -134,13 +150,15 @@ def validate(
 
     if (case is None) == (not every):
         raise click.UsageError("give either --case NAME or --all")
-    if every and samples:
-        raise click.UsageError("--samples goes with --case")
+    if every and (samples or any(own.values())):
+        raise click.UsageError("--samples, --vehicle, --reference and --frame go with --case")
+    if own["frame"] and not own["reference"]:
+        raise click.UsageError("--frame goes with --reference")
     if out.exists() and not out.is_dir():
         raise InputError(str(out), "a file", "a folder for the figures")
     console = _console(quiet=json_path == "-")
     try:
-        done, result = _one(case, db, version, console) if case else _all(db, version, cases, console)
+        done, result = _one(case, db, version, own, console) if case else _all(db, version, cases, console)
     except NoEquilibrium as error:
         raise InputError(f"case {case or 'of --all'}", str(error), "a state the boat can hold") from error
     from ident.figures import case_figure
@@ -155,11 +173,13 @@ def validate(
         raise click.exceptions.Exit(1)
 
 
-def _one(case: str, db: str, version: int | None, console: Any) -> tuple[list[Any], dict[str, Any]]:
+def _one(
+    case: str, db: str, version: int | None, own: dict[str, Any], console: Any
+) -> tuple[list[Any], dict[str, Any]]:
     from ident.validate import show, validate
 
     with console.status("flying the case (the first run on a machine compiles for half a minute)"):
-        done = validate(case, db, version)
+        done = validate(case, db, version, own["vehicle"], own["reference"], own["frame"])
     show(done, console)
     return [done], done.result
 

@@ -8,8 +8,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ident.validate import Validation, validate
+from sim.case import load_case
 from sim.database import find_version
 from sim.errors import InputError
+from sim.trim import NoEquilibrium
 from sim.vehicle import bundled
 
 if TYPE_CHECKING:
@@ -62,7 +64,8 @@ def run_all(
     board : ``database``, ``cases`` (the single-case objects, each with ``trained``),
         ``geometric_mean_ratio`` of the error ratios to the published model over cases the
         version was trained on and not; None where there is none.
-    flown : The validations, in the order of the cases.
+    flown : The validations, in the order of the cases; a case that starts from a
+        self-propulsion state that does not exist is not among them, and ``failed`` on the board.
 
     Raises
     ------
@@ -75,7 +78,16 @@ def run_all(
     flown, cases = [], []
     for name in names:
         each(name)
-        done = validate(name, db, record.number)
+        try:
+            done = validate(name, db, record.number)
+        except NoEquilibrium as error:
+            nothing: dict[str, Any] = {"references": {}, "metrics": {}, "outside_tables": [], "passed": False}
+            database = {"path": db, "version": record.number, "digest": record.digest}
+            case = load_case(name)[0].name
+            cases.append(
+                {"case": case, "database": database, **nothing, "failed": str(error), "trained": case in trained}
+            )
+            continue
         flown.append(done)
         cases.append({**done.result, "trained": done.case.name in trained})
     board = {
@@ -106,6 +118,9 @@ def show(board: dict[str, Any], console: Console) -> None:
                 used = "yes" if case["trained"] else "no"
                 table.add_row(case["case"], source, channel, f"{e['rmse']:.4g}", published, ratio, e["unit"], used)
     console.print(table)
+    for case in board["cases"]:
+        if "failed" in case:
+            console.print(f"[red]{case['case']} not flown: {case['failed']}[/]", highlight=False)
     for kind, value in board["geometric_mean_ratio"].items():
         shown = "no case" if value is None else f"{value:.2f}"
         console.print(f"geometric mean of the ratios, {kind} cases: {shown}", highlight=False)

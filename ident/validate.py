@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ident.metrics import roll_decay, zigzag
-from sim.case import Case, Series, in_radians, load_case, load_reference
-from sim.coefficients import Coefficient, Coefficients
+from ident.coverage import outside_tables
+from ident.measure import measured
+from ident.sweep import with_grid
+from sim.case import Case, Reference, Series, load_case, load_reference, read_series
+from sim.coefficients import Coefficients
 from sim.database import axis_columns, find_version, read_rows
 from sim.errors import InputError
-from sim.forces import boat_features, plane_features
+from sim.schema import FrameData
 from sim.simulate import CHANNELS, Simulation, simulate
 from sim.vehicle import Vehicle, load_vehicle
 
@@ -24,9 +25,10 @@ if TYPE_CHECKING:
     from rich.console import Console
 
 Array = NDArray[np.float64]
-Features = dict[str, float]
-# Samples of a record at which table coverage is looked at: enough for a share of time.
-_COVERAGE_SAMPLES = 200
+_FRAMES = {
+    "source": FrameData(x="aft", y="starboard", z="up"),
+    "program": FrameData(x="forward", y="starboard", z="down"),
+}
 
 
 @dataclass(frozen=True)
@@ -39,6 +41,7 @@ class Validation:
     result : The JSON object of the comparison.
     constant_axes : Term -> axes along which it was measured at one value only.
     vehicle, rows : What was flown.
+    own : Flights from the start of a source's record, by source.
     """
 
     case: Case
@@ -48,14 +51,15 @@ class Validation:
     constant_axes: dict[str, list[str]]
     vehicle: Vehicle
     rows: pd.DataFrame
+    own: dict[str, Simulation]
 
 
-def rmse(simulation: Simulation, channel: str, series: tuple[Array, Array, str]) -> float:
-    """Root mean square difference at the reference's own times, in its unit."""
-    time, value, unit = series
+def rmse(simulation: Simulation, channel: str, series: tuple[Array, Array, str], abscissa: str = "t") -> float:
+    """Root mean square difference at the reference's own times or path lengths, in its unit."""
+    along, value, unit = series
     flown = simulation[channel]
     flown = np.degrees(flown) if unit.startswith("deg") else flown
-    return float(np.sqrt(np.mean((np.interp(time, simulation["t"], flown) - value) ** 2)))
+    return float(np.sqrt(np.mean((np.interp(along, simulation[abscissa], flown) - value) ** 2)))
 
 
 def check_reference(case: Case, reference: Series, where: str) -> None:
@@ -66,7 +70,7 @@ def check_reference(case: Case, reference: Series, where: str) -> None:
     InputError
         Naming the case file, what was found and what is allowed.
     """
-    if case.reference is None:
+    if case.reference is None or not reference.data:
         return
     named = {*case.reference.compare, *([case.reference.published_model] if case.reference.published_model else [])}
     for source in sorted(named - set(reference.data)):
@@ -80,139 +84,69 @@ def check_reference(case: Case, reference: Series, where: str) -> None:
             raise InputError(f"{where}, key reference.channels", repr(channel), "a channel of the reference file")
         for unit in sorted(units - allowed):
             text = f"{channel} in {unit!r}"
-            raise InputError(case.reference.file, text, " or ".join(sorted(allowed)))
+            raise InputError(case.reference.file or where, text, " or ".join(sorted(allowed)))
 
 
-def _errors(case: Case, simulation: Simulation, reference: Series) -> dict[str, Any]:
-    if case.reference is None:
-        return {}
+def _published(published: dict[str, tuple[Array, Array, str]], channel: str, unit: str) -> tuple[Array, Array]:
+    """Abscissa and value of the published model in the reference's unit."""
+    along, value, own_unit = published[channel]
+    if own_unit != unit:
+        value = np.degrees(value) if unit.startswith("deg") else np.radians(value)
+    return along, value
+
+
+def _error(
+    simulation: Simulation, reference: Series, source: str, channel: str, published: dict[str, tuple[Array, Array, str]]
+) -> dict[str, Any]:
+    """Comparison of one channel with one source, as far as both go.
+
+    Raises
+    ------
+    InputError
+        When the reference begins after the run ends.
+    """
+    along, value, unit = reference[source][channel]
+    flown = along <= float(simulation[reference.abscissa][-1]) + 1e-9
+    if not flown.any():
+        end = f"the run ends at {simulation[reference.abscissa][-1]:.4g}"
+        raise InputError(f"reference {source} {channel}", f"begins at {reference.abscissa} = {along[0]:.4g}", end)
+    entry: dict[str, Any] = {
+        "rmse": rmse(simulation, channel, (along[flown], value[flown], unit), reference.abscissa),
+        "unit": unit,
+        "n": int(flown.sum()),
+        "published_model_rmse": None,
+        "ratio": None,
+        "reference_sigma": None,
+    }
+    sigma = reference.sigma.get(source, {}).get(channel)
+    if sigma is not None:
+        entry["reference_sigma"] = float(np.sqrt(np.mean(sigma[flown] ** 2)))
+    if channel in published:
+        other_along, other = _published(published, channel, unit)
+        both = flown & (along >= other_along[0]) & (along <= other_along[-1])
+        if both.any():
+            gap = np.interp(along[both], other_along, other) - value[both]
+            entry["published_model_rmse"] = float(np.sqrt(np.mean(gap**2)))
+            entry["ratio"] = entry["rmse"] / entry["published_model_rmse"] if entry["published_model_rmse"] else None
+    return entry
+
+
+def _errors(
+    case: Case, simulation: Simulation, reference: Series, own: dict[str, Simulation] | None = None
+) -> dict[str, Any]:
+    """Errors by source and channel; ``own`` holds the runs from a source's own start."""
     found: dict[str, Any] = {}
-    end = float(simulation["t"][-1])
+    if case.reference is None:
+        return found
     published = reference[case.reference.published_model or ""]
     for source in case.reference.compare:
-        found[source] = {}
-        for channel in case.reference.channels:
-            if channel not in reference[source]:
-                continue
-            time, value, unit = reference[source][channel]
-            flown = time <= end + 1e-9
-            entry: dict[str, Any] = {
-                "rmse": rmse(simulation, channel, (time[flown], value[flown], unit)),
-                "unit": unit,
-                "n": int(flown.sum()),
-                "published_model_rmse": None,
-                "ratio": None,
-            }
-            if channel in published:
-                other_time, other, other_unit = published[channel]
-                if other_unit != unit:
-                    other = np.degrees(other) if unit.startswith("deg") else np.radians(other)
-                both = flown & (time <= other_time[-1])
-                gap = np.interp(time[both], other_time, other) - value[both]
-                entry["published_model_rmse"] = float(np.sqrt(np.mean(gap**2)))
-                entry["ratio"] = entry["rmse"] / entry["published_model_rmse"]
-            found[source][channel] = entry
+        flown = (own or {}).get(source, simulation)
+        found[source] = {
+            channel: _error(flown, reference, source, channel, published)
+            for channel in case.reference.channels
+            if channel in reference[source]
+        }
     return found
-
-
-def _metrics(case: Case, simulation: Simulation, reference: Series) -> dict[str, dict[str, float | None]]:
-    dv, dh = case.command.dV, case.command.dH
-    if case.initial.heel_deg and case.initial.state == "as_given":
-        return _side_by_side(case, reference, "phi", roll_decay, (simulation["t"], simulation["phi"]))
-    if "zigzag" not in (dv.law, dh.law):
-        return {}
-    command, angle, rate, name = (dh, "psi", "r", "yaw") if dh.law == "zigzag" else (dv, "theta", "q", "pitch")
-    check, sense = math.radians(command.check_deg), 1 if command.first_deg > 0 else -1
-
-    def measure(t: Array, x: Array, turn: tuple[Array, Array] | None) -> dict[str, float | None]:
-        return zigzag(t, x, turn, check, sense, name)
-
-    metrics = _side_by_side(
-        case, reference, angle, measure, (simulation["t"], simulation[angle]), rate, (simulation["t"], simulation[rate])
-    )
-    for i, (time, _) in enumerate(simulation.executes[1:4]):
-        metrics[f"execute_{i + 2}_s"]["simulated"] = float(time)
-    return metrics
-
-
-def _side_by_side(
-    case: Case,
-    reference: Series,
-    angle: str,
-    measure: Callable[..., dict[str, float | None]],
-    flown: tuple[Array, Array],
-    rate: str | None = None,
-    flown_rate: tuple[Array, Array] | None = None,
-) -> dict[str, dict[str, float | None]]:
-    """Metrics of the simulated and every reference series, by metric and source."""
-    columns = {"simulated": measure(*flown, flown_rate) if rate else measure(*flown)}
-    sources = [*case.reference.compare, case.reference.published_model] if case.reference else []
-    for source in sources:
-        series = reference[source or ""]
-        if angle not in series:
-            continue
-        time, value, unit = series[angle]
-        value = in_radians(value, unit)
-        turn = series[rate][:2] if rate and rate in series else None
-        label = "published_model" if case.reference and source == case.reference.published_model else str(source)
-        columns[label] = measure(time, value, turn) if rate else measure(time, value)
-    return {k: {label: column.get(k) for label, column in columns.items()} for k in columns["simulated"]}
-
-
-def _states(simulation: Simulation, coefficients: Coefficients) -> list[tuple[Features, dict[str, Features]]]:
-    """Boat features, and features by plane, at evenly spread samples of a record."""
-    chosen = np.unique(np.linspace(0, len(simulation.record) - 1, _COVERAGE_SAMPLES).astype(int))
-    found: list[tuple[Features, dict[str, Features]]] = []
-    columns = {c: simulation.record[chosen, i] for i, c in enumerate(simulation.columns)}
-    wake = coefficients.get("w_T")
-    factor = 1.0 - (float(wake.values[0]) if wake else 0.0)
-    vehicle = coefficients.vehicle
-    for i in range(len(chosen)):
-        velocity = [columns[c][i] for c in "uvw"]
-        rates = [columns[c][i] for c in "pqr"]
-        n = columns["n"][i]
-        advance = factor * velocity[0] / (n * vehicle.propeller.diameter.value) if n else 0.0
-        boat = boat_features(velocity, rates, columns["z"][i] + simulation.depth_offset, n, advance)
-        planes = {p.name: plane_features(p, velocity, rates, columns[p.name][i]) for p in vehicle.planes}
-        found.append((boat, planes))
-    return found
-
-
-def _outside(simulation: Simulation, coefficients: Coefficients) -> tuple[list[dict[str, Any]], dict[str, list[str]]]:
-    """Share of time each term was used beyond its data, and its one-valued axes."""
-    states = _states(simulation, coefficients)
-    found: list[dict[str, Any]] = []
-    constant: dict[str, list[str]] = {}
-    for coefficient in coefficients:
-        term, table = coefficient.term, coefficient.table
-        if term.is_acceleration or not term.axes:
-            continue
-        points = np.array(
-            [[{**boat, **planes.get(coefficient.part, {})}[a] for a in term.axes] for boat, planes in states]
-        )
-        for k, axis in enumerate(term.axes):
-            low, high = table.range(axis)
-            if low == high and term.extrapolation[axis] != "absent":
-                constant.setdefault(term.name, []).append(axis)
-                continue
-            slack = 1e-9 * max(abs(low), abs(high))
-            share = float(np.mean((points[:, k] < low - slack) | (points[:, k] > high + slack)))
-            if share > 0.0:
-                found.append({"term": term.name, "axis": axis, "fraction_of_time": share})
-        found += _combined(coefficient, points)
-    return found, constant
-
-
-def _combined(coefficient: Coefficient, points: Array) -> list[dict[str, Any]]:
-    """Share of time at flow angles of which no run has both."""
-    axes = coefficient.term.axes
-    if not {"alpha", "beta"} <= set(axes) or coefficient.table.measured.all():
-        return []
-    varied = [a for a in ("alpha", "beta") if coefficient.table.range(a)[0] < coefficient.table.range(a)[1]]
-    if len(varied) < 2:
-        return []
-    share = float(np.mean([coefficient.table.covered(x) < 0.5 for x in points]))
-    return [{"term": coefficient.term.name, "axis": "alpha x beta", "fraction_of_time": share}] if share else []
 
 
 def _passed(case: Case, errors: dict[str, Any]) -> bool:
@@ -229,7 +163,51 @@ def _passed(case: Case, errors: dict[str, Any]) -> bool:
     return True
 
 
-def validate(name: str, db: str, version: int | None = None) -> Validation:
+def _with_reference(case: Case, path: Path, frame: str | None) -> tuple[Case, Series]:
+    """A case held against a user's own reference file, every channel that the simulation has.
+
+    Parameters
+    ----------
+    frame : ``source`` (x aft, z up), ``program`` (x forward, z down), or None: as the case
+        declares, else the program frame.
+
+    Raises
+    ------
+    InputError
+        For a file that cannot be read or holds nothing to compare.
+    """
+    declared = case.reference.frame if case.reference and not frame else _FRAMES[frame or "program"]
+    if not path.is_file():
+        raise InputError(str(path), "no such file", "a CSV file: source, channel, t or s, value, unit")
+    header = path.open(encoding="utf-8").readline().strip().split(",")
+    abscissa: Literal["t", "s"] = "s" if "s" in header and "t" not in header else "t"
+    series = read_series(path, abscissa, declared.declared(f"case {case.name}, key reference.frame"))
+    model = case.reference.published_model if case.reference else None
+    compare = [s for s in series.data if s != model]
+    channels = [c for c in CHANNELS if any(c in series[s] for s in compare)]
+    if not channels:
+        found = ", ".join(sorted({c for s in series.data.values() for c in s})) or "no row"
+        raise InputError(f"{path}, column channel", found, ", ".join(CHANNELS))
+    reference = Reference(
+        file=str(path),
+        published_model=model if model in series.data else None,
+        compare=compare,
+        channels=channels,
+        abscissa=abscissa,
+        frame=declared,
+        initial={k: v for k, v in (case.reference.initial if case.reference else {}).items() if k in compare},
+    )
+    return case.model_copy(update={"reference": reference, "tolerance": []}), series
+
+
+def validate(
+    name: str,
+    db: str,
+    version: int | None = None,
+    vehicle_name: str | None = None,
+    reference_file: Path | None = None,
+    reference_frame: str | None = None,
+) -> Validation:
     """Fly a case from a database version and compare.
 
     Parameters
@@ -237,33 +215,64 @@ def validate(name: str, db: str, version: int | None = None) -> Validation:
     name : Bundled case or path to a case file.
     db : Database path or URL.
     version : Database version, latest when None.
+    vehicle_name : Bundled vehicle or path to a vehicle file, instead of the case's.
+    reference_file, reference_frame : A user's own reference instead of the case's, and its
+        frame, ``source`` or ``program``; the case's when None.
 
     Raises
     ------
     InputError
-        For a case, reference, database or version that does not exist or does not fit.
+        For a case, vehicle, reference, database or version that does not exist or fit.
     sim.trim.NoEquilibrium
         When the case starts from self-propulsion and there is none.
     """
     case, where = load_case(name)
-    reference = load_reference(case, where)
+    if reference_file is not None:
+        case, reference = _with_reference(case, reference_file, reference_frame)
+    else:
+        reference = load_reference(case, where)
     check_reference(case, reference, where)
-    vehicle = load_vehicle(case.vehicle, beside=where)
+    vehicle = load_vehicle(vehicle_name) if vehicle_name else load_vehicle(case.vehicle, beside=where)
+    case = case.model_copy(update={"vehicle": vehicle.name})
     rows, number = read_rows(db, version, vehicle.name)
     coefficients = Coefficients(vehicle, rows)
     simulation = simulate(case, coefficients)
-    errors = _errors(case, simulation, reference)
-    outside, constant = _outside(simulation, coefficients)
-    complete = simulation["t"][-1] >= case.run.duration_s - case.run.record_s
+    started = {s: case.started_as(s) for s in (case.reference.compare if case.reference else [])}
+    own = {s: simulate(c, coefficients) for s, c in started.items() if c is not None}
+    errors = _errors(case, simulation, reference, own)
+    metrics, curve = measured(case, simulation, reference, own)
+    grid = with_grid(case, coefficients, metrics)
+    outside, constant = outside_tables(simulation, coefficients)
     result = {
         "case": case.name,
+        "vehicle": vehicle.name,
         "database": {"path": db, "version": number, "digest": find_version(db, number).digest},
         "references": errors,
-        "metrics": _metrics(case, simulation, reference),
+        "metrics": metrics,
         "outside_tables": outside,
-        "passed": bool(complete and _passed(case, errors)),
+        **({"curve": curve} if curve else {}),
+        **grid,
+        "trim_limited": list(simulation.trim.limited) if simulation.trim else [],
+        "ends_s": float(simulation.end[0]),
+        "passed": bool(_complete(simulation) and _passed(case, errors) and _published_met(case, metrics)),
     }
-    return Validation(case, simulation, reference, result, constant, vehicle, rows)
+    return Validation(case, simulation, reference, result, constant, vehicle, rows, own)
+
+
+def _complete(simulation: Simulation) -> bool:
+    """Whether the run went to its duration, or to an event that ends it, in finite numbers."""
+    return bool(np.isfinite(simulation.end).all())
+
+
+def _published_met(case: Case, metrics: dict[str, Any]) -> bool:
+    """Whether every published value with a tolerance is met."""
+    for value in case.published:
+        if value.tolerance is None:
+            continue
+        found = metrics.get(value.metric, {}).get("simulated")
+        if found is None or abs(found - value.value) > value.tolerance * abs(value.value):
+            return False
+    return True
 
 
 def _number(value: float | None, digits: int = 4) -> str:
@@ -294,14 +303,30 @@ def show(done: Validation, console: Console) -> None:
         for metric, values in result["metrics"].items():
             table.add_row(metric, *[_number(values[c]) for c in labels])
         console.print(table)
+    _show_grid(result.get("grid", []), console)
     _show_outside(done, console)
+    if result["trim_limited"]:
+        console.print(f"[red]at the start at their limit: {', '.join(result['trim_limited'])}[/]")
     end = float(done.simulation["t"][-1])
-    if end < done.case.run.duration_s - done.case.run.record_s:
+    if not _complete(done.simulation):
         console.print(f"[red]the simulation left the finite numbers after {end:.1f} s; errors are up to there[/]")
     if float(done.simulation["D0"].min()) < 0.0:
         console.print("[red]the sail top left the water; the model holds for a fully submerged boat only[/]")
     verdict = "[green]within[/]" if result["passed"] else "[red]outside[/]"
     console.print(f"{verdict} the tolerances of the case file")
+
+
+def _show_grid(grid: list[dict[str, Any]], console: Console) -> None:
+    from rich.table import Table
+
+    if not grid:
+        return
+    keys = ("speed_mps", "depth_m", "n_rps", "pitch_deg", "heel_deg", "dV_deg", "dH_deg", "ballast_kg", "trim_tank_m")
+    table = Table(*keys, "remark", title="Self-propulsion")
+    for point in grid:
+        remark = point["reason"] or ", ".join(f"{k} at its limit" for k in point["limited"])
+        table.add_row(*[_number(point[k]) for k in keys], remark)
+    console.print(table)
 
 
 def _show_outside(done: Validation, console: Console) -> None:

@@ -2,21 +2,38 @@
 
 from __future__ import annotations
 
-import math
 from importlib.resources import files
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
+from sim.commands import Commands, Event
 from sim.errors import InputError
+from sim.frames import Frame
 from sim.schema import Data, FrameData, checked
 from sim.vehicle import bundled, read_toml
 
+if TYPE_CHECKING:
+    import pandas as pd
+
 Array = NDArray[np.float64]
 Positive = Annotated[float, Field(gt=0)]
+
+Maneuver = Literal[
+    "turning_circle",
+    "direct_spiral",
+    "reverse_spiral",
+    "pull_out",
+    "stopping",
+    "meander",
+    "depth_change",
+    "course_keeping",
+    "rise",
+    "self_propulsion",
+]
 
 # A record of more steps than this does not fit a laptop's memory.
 _MOST_STEPS = 1e7
@@ -30,7 +47,11 @@ class EnvironmentData(Data):
 
 
 class Initial(Data):
-    """Initial state: solved self-propulsion, or the given speed as it is."""
+    """Initial state: solved self-propulsion, or the given speed as it is.
+
+    ``trim`` says what keeps a self-propelled boat level: the planes and the pitch that they
+    need; planes and ballast at no pitch; or ballast and trim tank at no pitch and no planes.
+    """
 
     state: Literal["self_propulsion", "as_given"]
     speed_mps: Annotated[float, Field(ge=0)]
@@ -38,6 +59,7 @@ class Initial(Data):
     heel_deg: float = 0.0
     pitch_deg: float = 0.0
     revolutions_rps: float | None = None
+    trim: Literal["planes", "ballast", "tanks"] = "planes"
 
     @model_validator(mode="after")
     def _propelled_boats_move(self) -> Initial:
@@ -47,11 +69,12 @@ class Initial(Data):
 
 
 class Run(Data):
-    """Duration, control sample (and integration step), and time between records."""
+    """Duration, control sample (and integration step), time between records; events that end it."""
 
     duration_s: Annotated[float, Field(gt=0, le=1e5)]
     step_s: Annotated[float, Field(gt=0, le=10.0)]
     record_s: Positive
+    stop: list[Event] = Field(default_factory=list)
 
     @model_validator(mode="after")
     def _a_run_of_a_size(self) -> Run:
@@ -62,70 +85,50 @@ class Run(Data):
         return self
 
 
-class PlaneCommand(Data):
-    """Law of dV or dH. Gains in degrees and metres, positive when they steer back."""
+class Start(Data):
+    """How the record of one source starts, where it is not as the case starts."""
 
-    law: Literal["fixed", "pid", "zigzag"]
-    value_deg: float = 0.0
-    first_deg: float = 0.0
-    check_deg: float = 0.0
-    limit_deg: Positive = 30.0
-    P_z: float = 0.0
-    I_z: float = 0.0
-    D_z: float = 0.0
-    P_theta: float = 0.0
-    I_theta: float = 0.0
-    D_theta: float = 0.0
-    P_y: float = 0.0
-    I_y: float = 0.0
-    D_y: float = 0.0
-    P_psi: float = 0.0
-    I_psi: float = 0.0
-    D_psi: float = 0.0
-
-    @model_validator(mode="after")
-    def _zigzag_has_angles(self) -> PlaneCommand:
-        if self.law == "zigzag" and not (self.first_deg and self.check_deg > 0.0):
-            raise ValueError("a zigzag needs first_deg, not zero, and check_deg, positive")
-        return self
-
-    def gains(self, distance: str, angle: str) -> list[float]:
-        """P I D on a distance [rad/m] and on an angle [rad/rad]."""
-        first = [math.radians(getattr(self, f"{k}_{distance}")) for k in "PID"]
-        return first + [getattr(self, f"{k}_{angle}") for k in "PID"]
-
-
-class SpeedCommand(Data):
-    """Law of the revolutions: fixed at the initial value, or PID on the speed."""
-
-    law: Literal["fixed", "pid"]
-    P_u: float = 0.0
-    I_u: float = 0.0
-    D_u: float = 0.0
-
-
-class Commands(Data):
-    """Laws of the vertical and horizontal command and of the revolutions."""
-
-    dV: PlaneCommand
-    dH: PlaneCommand
-    n: SpeedCommand
-
-    @model_validator(mode="after")
-    def _one_zigzag(self) -> Commands:
-        if self.dV.law == self.dH.law == "zigzag":
-            raise ValueError("one zigzag at a time: in dV or in dH")
-        return self
+    source: str
+    speed_mps: Annotated[float, Field(gt=0)] | None = None
+    depth_m: float | None = None
+    heel_deg: float | None = None
+    pitch_deg: float | None = None
+    revolutions_rps: float | None = None
 
 
 class Reference(Data):
-    """Where the reference series are and what to compare with them."""
+    """Where the reference series are and what to compare with them.
 
-    file: str
+    Without ``file`` the case has no bundled reference, and users bring their own.
+    ``abscissa``: the series are over time, or over the path length over ground.
+    ``initial``: sources that are compared with a run from their own start.
+    """
+
+    file: str | None = None
     published_model: str | None = None
-    compare: list[str]
-    channels: list[str]
+    compare: list[str] = Field(default_factory=list)
+    channels: list[str] = Field(default_factory=list)
+    abscissa: Literal["t", "s"] = "t"
     frame: FrameData
+    initial: dict[str, Start] = Field(default_factory=dict)
+
+
+class Sweep(Data):
+    """Speeds and depths at which self-propulsion is solved, each with each."""
+
+    speed_mps: Annotated[list[Positive], Field(min_length=1)]
+    depth_m: Annotated[list[float], Field(min_length=1)]
+
+
+class Published(Data):
+    """A published value of one metric, and the relative deviation that is accepted."""
+
+    metric: str
+    source: str
+    value: float
+    unit: str
+    note: str
+    tolerance: Positive | None = None
 
 
 class Tolerance(Data):
@@ -138,29 +141,48 @@ class Tolerance(Data):
 
 
 class Case(Data):
-    """A maneuver case file."""
+    """A maneuver case file. ``maneuver`` names the metrics; zigzags and roll decays need none."""
 
     name: str
     title: str
     vehicle: str
     source: str
+    maneuver: Maneuver | None = None
     sail_planes: bool = True
     environment: EnvironmentData
     initial: Initial
     run: Run
     command: Commands
+    sweep: Sweep | None = None
     reference: Reference | None = None
+    published: list[Published] = Field(default_factory=list)
     tolerance: list[Tolerance] = Field(default_factory=list)
+
+    def started_as(self, source: str) -> Case | None:
+        """This case from the start of one source's record; None when it is the case's own."""
+        start = self.reference.initial.get(source) if self.reference else None
+        if start is None:
+            return None
+        moved = start.model_dump(exclude_none=True, exclude={"source"})
+        return self.model_copy(update={"initial": self.initial.model_copy(update=moved)})
 
 
 class Series:
     """Reference series by source and channel, in the program frame.
 
-    ``self[source][channel]`` is (time [s], value, unit).
+    ``self[source][channel]`` is (abscissa, value, unit): time [s] or path length [m].
+    ``sigma[source][channel]`` is the standard error of reading the value, where stated.
     """
 
-    def __init__(self, data: dict[str, dict[str, tuple[Array, Array, str]]]) -> None:
+    def __init__(
+        self,
+        data: dict[str, dict[str, tuple[Array, Array, str]]],
+        abscissa: Literal["t", "s"] = "t",
+        sigma: dict[str, dict[str, Array]] | None = None,
+    ) -> None:
         self.data = data
+        self.abscissa = abscissa
+        self.sigma = sigma or {}
 
     def __getitem__(self, source: str) -> dict[str, tuple[Array, Array, str]]:
         return self.data.get(source, {})
@@ -187,12 +209,65 @@ def load_case(name: str | Path) -> tuple[Case, str]:
     return checked(Case, data, where), where
 
 
+def _numbers(table: pd.DataFrame, column: str, path: Path) -> None:
+    """Make a column numbers. Raises ``InputError`` naming the row that is not."""
+    import pandas as pd
+
+    numbers = pd.to_numeric(table[column], errors="coerce").astype(float)
+    bad = np.flatnonzero(~np.isfinite(numbers))
+    if bad.size:
+        place = f"{path}, row {bad[0] + 2}, column {column}"
+        raise InputError(place, repr(table[column].iloc[bad[0]]), "a finite number")
+    table[column] = numbers
+
+
+def read_series(path: Path, abscissa: Literal["t", "s"], frame: Frame) -> Series:
+    """Read reference series and turn them to the program frame.
+
+    Parameters
+    ----------
+    path : CSV with the columns source, channel, t or s, value, unit, and, optional, sigma.
+    abscissa : Column over which the series are given.
+    frame : Axis directions of the file.
+
+    Raises
+    ------
+    InputError
+        For a missing file or column, or a non-number.
+    """
+    import pandas as pd
+
+    try:
+        table = pd.read_csv(path, dtype={"source": str, "channel": str, "unit": str})
+    except (ValueError, pd.errors.ParserError) as error:
+        raise InputError(str(path), f"not a table: {error}", "a CSV file with a header") from error
+    for column in ("source", "channel", abscissa, "value", "unit"):
+        if column not in table:
+            raise InputError(str(path), f"column {column} missing", f"source, channel, {abscissa}, value, unit")
+    for column in (abscissa, "value", *(["sigma"] if "sigma" in table else [])):
+        _numbers(table, column, path)
+    data: dict[str, dict[str, tuple[Array, Array, str]]] = {}
+    sigma: dict[str, dict[str, Array]] = {}
+    for (source, channel), rows in table.groupby(["source", "channel"], sort=False):
+        along = rows[abscissa].to_numpy(dtype=float)
+        if np.any(np.diff(along) <= 0.0):
+            raise InputError(f"{path}, {source} {channel}", f"column {abscissa} not increasing", "increasing values")
+        units = rows["unit"].unique()
+        if len(units) > 1:
+            raise InputError(f"{path}, {source} {channel}", f"units {', '.join(units)}", "one unit a series")
+        value = rows["value"].to_numpy(dtype=float) * frame.sign(str(channel))
+        data.setdefault(str(source), {})[str(channel)] = (along, value, str(units[0]))
+        if "sigma" in rows:
+            sigma.setdefault(str(source), {})[str(channel)] = rows["sigma"].to_numpy(dtype=float)
+    return Series(data, abscissa, sigma)
+
+
 def load_reference(case: Case, where: str) -> Series:
     """Reference series of a case, turned to the program frame.
 
     Parameters
     ----------
-    case : With a reference.
+    case : With a reference or without.
     where : As returned by ``load_case``; its folder holds the reference file.
 
     Raises
@@ -200,31 +275,15 @@ def load_reference(case: Case, where: str) -> Series:
     InputError
         For a missing file or column, a non-number, or an undeclared frame.
     """
-    import pandas as pd
-
     if case.reference is None:
         return Series({})
+    frame = case.reference.frame.declared(f"{where}, key reference.frame")
+    if case.reference.file is None:
+        return Series({}, case.reference.abscissa)
     if where in bundled("cases"):
         path = Path(str(files("sim") / "cases" / case.reference.file))
     else:
         path = Path(where).parent / case.reference.file
     if not path.is_file():
         raise InputError(str(path), "missing", f"the reference file of case {case.name}")
-    frame = case.reference.frame.declared(f"{where}, key reference.frame")
-    table = pd.read_csv(path, dtype={"source": str, "channel": str, "unit": str})
-    for column in ("source", "channel", "t", "value", "unit"):
-        if column not in table:
-            raise InputError(str(path), f"column {column} missing", "source, channel, t, value, unit")
-    for column in ("t", "value"):
-        numbers = pd.to_numeric(table[column], errors="coerce").astype(float)
-        bad = np.flatnonzero(~np.isfinite(numbers))
-        if bad.size:
-            place = f"{path}, row {bad[0] + 2}, column {column}"
-            raise InputError(place, repr(table[column].iloc[bad[0]]), "a finite number")
-        table[column] = numbers
-    data: dict[str, dict[str, tuple[Array, Array, str]]] = {}
-    for (source, channel), rows in table.groupby(["source", "channel"], sort=False):
-        time = rows["t"].to_numpy(dtype=float)
-        value = rows["value"].to_numpy(dtype=float) * frame.sign(str(channel))
-        data.setdefault(str(source), {})[str(channel)] = (time, value, str(rows["unit"].iloc[0]))
-    return Series(data)
+    return read_series(path, case.reference.abscissa, frame)

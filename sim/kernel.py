@@ -4,7 +4,8 @@ Everything here runs without Python objects. ``Model`` is a named tuple of array
 scalars built by ``sim.model``; angles are radians, the rest SI, frame SNAME.
 
 State ``y`` (12,): u v w p q r [m/s, rad/s], x y z [m, earth, z down], phi theta psi [rad].
-Controls ``c``: one deflection a plane [rad], then n [1/s].
+Controls ``c``: one deflection a plane [rad], then n [1/s]; a boat that uses its tanks has two
+more, ballast [kg] and the shift of the centre of gravity by the trim tank [m, forward].
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
+from numba.extending import overload
 
 from sim.catalogue import BOAT_FEATURES, PLANE_FEATURES
 
@@ -37,6 +39,8 @@ class Model(NamedTuple):
         coefficients, first row in ``data``; data : (rows, WIDTH) grid nodes, coefficients.
     links : (l, 2) axis and stride; axes : (a, 4) feature, rule, first node, nodes.
     terms : (k, 5) output and four factors of each coefficient; scale : (k,) its load scale.
+    mass_matrix : (6, 6) rigid-body plus added mass. tank : where ballast is taken [m], or
+        empty: a boat without tanks in use is compiled without them, a fifth faster.
     """
 
     inverse_mass: np.ndarray
@@ -57,6 +61,8 @@ class Model(NamedTuple):
     data: np.ndarray
     terms: np.ndarray
     scale: np.ndarray
+    mass_matrix: np.ndarray
+    tank: tuple[()] | tuple[float, float, float]
 
 
 class Work(NamedTuple):
@@ -69,6 +75,7 @@ class Work(NamedTuple):
     weight: np.ndarray
     lower: np.ndarray
     fraction: np.ndarray
+    system: np.ndarray
 
 
 def workspace(n_planes: int) -> Work:
@@ -81,6 +88,7 @@ def workspace(n_planes: int) -> Work:
         np.zeros(MAX_CORNERS),
         np.zeros(MAX_AXES, dtype=np.int64),
         np.zeros(MAX_AXES),
+        np.zeros((6, 7)),
     )
 
 
@@ -189,6 +197,97 @@ def loads(m: Model, work: Work) -> None:
     out[0] += (1.0 - out[OUT_DEDUCTION]) * out[OUT_THRUST]
 
 
+def _tank_loads(m: Model, y: np.ndarray, c: np.ndarray, tank: tuple[float, ...], out: np.ndarray) -> None:
+    """Add weight and centripetal loads of what the tanks change, a body on its own.
+
+    Its mass is ``dm`` [kg], at the tank; its first moment is that of ``dm`` and of the boat's
+    mass moved forward by ``shift`` [m]; its inertia is that of ``dm``.
+    """
+    dm, shift = c[m.planes.shape[0] + 1], c[m.planes.shape[0] + 2]
+    u, v, w, p, q, r = y[0], y[1], y[2], y[3], y[4], y[5]
+    g = m.weight / m.mass
+    st, ct = sin(y[10]), cos(y[10])
+    gx, gy, gz = -st * g, ct * sin(y[9]) * g, ct * cos(y[9]) * g
+    x, yy, z = tank
+    sx, sy, sz = m.mass * shift + dm * x, dm * yy, dm * z
+    # g - omega x v, and omega x (omega x S)
+    ax, ay, az = gx - (q * w - r * v), gy - (r * u - p * w), gz - (p * v - q * u)
+    bx, by, bz = q * sz - r * sy, r * sx - p * sz, p * sy - q * sx
+    # omega x (I omega) of the point mass: dm r x (omega (omega . r))
+    turn = -dm * (p * x + q * yy + r * z)
+    out[0] += dm * ax - (q * bz - r * by)
+    out[1] += dm * ay - (r * bx - p * bz)
+    out[2] += dm * az - (p * by - q * bx)
+    out[3] += sy * az - sz * ay - turn * (q * z - r * yy)
+    out[4] += sz * ax - sx * az - turn * (r * x - p * z)
+    out[5] += sx * ay - sy * ax - turn * (p * yy - q * x)
+
+
+def _accelerate(m: Model, c: np.ndarray, tank: tuple[float, ...], a: np.ndarray, dy: np.ndarray) -> None:
+    """Turn six loads in ``dy`` into accelerations, with the tanks in the mass matrix.
+
+    Elimination without pivoting, because the matrix is positive definite; ``a`` is scratch.
+    """
+    dm, shift = c[m.planes.shape[0] + 1], c[m.planes.shape[0] + 2]
+    x, y, z = tank
+    sx, sy, sz = m.mass * shift + dm * x, dm * y, dm * z
+    for i in range(6):
+        for j in range(6):
+            a[i, j] = m.mass_matrix[i, j]
+        a[i, 6] = dy[i]
+    for i in range(3):
+        a[i, i] += dm
+    for i, j, moment in ((0, 4, sz), (0, 5, -sy), (1, 3, -sz), (1, 5, sx), (2, 3, sy), (2, 4, -sx)):
+        a[i, j] += moment
+        a[j, i] += moment
+    for i, j, product in ((3, 4, -x * y), (3, 5, -x * z), (4, 5, -y * z)):
+        a[i, j] += dm * product
+        a[j, i] += dm * product
+    a[3, 3] += dm * (y * y + z * z)
+    a[4, 4] += dm * (x * x + z * z)
+    a[5, 5] += dm * (x * x + y * y)
+    for k in range(6):
+        for i in range(k + 1, 6):
+            factor = a[i, k] / a[k, k]
+            for j in range(k + 1, 7):
+                a[i, j] -= factor * a[k, j]
+    for k in range(5, -1, -1):
+        left = a[k, 6]
+        for j in range(k + 1, 6):
+            left -= a[k, j] * dy[j]
+        dy[k] = left / a[k, k]
+
+
+def _no_tank_loads(m: Model, y: np.ndarray, c: np.ndarray, tank: tuple[float, ...], out: np.ndarray) -> None:
+    pass
+
+
+def _accelerate_dry(m: Model, c: np.ndarray, tank: tuple[float, ...], a: np.ndarray, dy: np.ndarray) -> None:
+    f0, f1, f2, f3, f4, f5 = dy[0], dy[1], dy[2], dy[3], dy[4], dy[5]
+    inverse = m.inverse_mass
+    for i in range(6):
+        dy[i] = (
+            inverse[i, 0] * f0
+            + inverse[i, 1] * f1
+            + inverse[i, 2] * f2
+            + inverse[i, 3] * f3
+            + inverse[i, 4] * f4
+            + inverse[i, 5] * f5
+        )
+
+
+# A branch at run time, even one never taken, costs a fifth of the right-hand side, so the
+# compiler chooses by the type of ``tank``.
+@overload(_tank_loads, inline="always")
+def _choose_loads(m: Model, y: np.ndarray, c: np.ndarray, tank: tuple[float, ...], out: np.ndarray) -> object:
+    return _tank_loads if len(tank) else _no_tank_loads
+
+
+@overload(_accelerate, inline="always")
+def _choose_accelerate(m: Model, c: np.ndarray, tank: tuple[float, ...], a: np.ndarray, dy: np.ndarray) -> object:
+    return _accelerate if len(tank) else _accelerate_dry
+
+
 @njit(cache=True, error_model="numpy")
 def rhs(m: Model, y: np.ndarray, c: np.ndarray, work: Work, dy: np.ndarray) -> None:
     """Time derivative of the state, Eqs. (12)-(16) as corrected, added mass on the left.
@@ -197,12 +296,14 @@ def rhs(m: Model, y: np.ndarray, c: np.ndarray, work: Work, dy: np.ndarray) -> N
     ----------
     m : Model.
     y : (12,) state.
-    c : (planes + 1,) deflections [rad] and n [1/s].
+    c : (planes + 1,) deflections [rad] and n [1/s]; with a tank in the model (planes + 3,),
+        with ballast [kg] and shift of the centre of gravity [m].
     work : Scratch arrays.
     dy : (12,) result.
     """
     fill_features(m, y, c, work.features)
     loads(m, work)
+    _tank_loads(m, y, c, m.tank, work.loads)
     u, v, w, p, q, r = y[0], y[1], y[2], y[3], y[4], y[5]
     phi, theta, psi = y[9], y[10], y[11]
     sf, cf, st, ct, sp, cp = sin(phi), cos(phi), sin(theta), cos(theta), sin(psi), cos(psi)
@@ -223,16 +324,8 @@ def rhs(m: Model, y: np.ndarray, c: np.ndarray, work: Work, dy: np.ndarray) -> N
     f3 = work.loads[3] + my * gz - mz * gy - (q * hz - r * hy) - m.mass * (yg * cz - zg * cy)
     f4 = work.loads[4] + mz * gx - mx * gz - (r * hx - p * hz) - m.mass * (zg * cx - xg * cz)
     f5 = work.loads[5] + mx * gy - my * gx - (p * hy - q * hx) - m.mass * (xg * cy - yg * cx)
-    inverse = m.inverse_mass
-    for i in range(6):
-        dy[i] = (
-            inverse[i, 0] * f0
-            + inverse[i, 1] * f1
-            + inverse[i, 2] * f2
-            + inverse[i, 3] * f3
-            + inverse[i, 4] * f4
-            + inverse[i, 5] * f5
-        )
+    dy[0], dy[1], dy[2], dy[3], dy[4], dy[5] = f0, f1, f2, f3, f4, f5
+    _accelerate(m, c, m.tank, work.system, dy)
     dy[6] = ct * cp * u + (sf * st * cp - cf * sp) * v + (cf * st * cp + sf * sp) * w
     dy[7] = ct * sp * u + (sf * st * sp + cf * cp) * v + (cf * st * sp - sf * cp) * w
     dy[8] = -st * u + sf * ct * v + cf * ct * w
@@ -257,9 +350,9 @@ def rk4(
     Parameters
     ----------
     y, out : (12,) states before and after (may be the same array).
-    c, rate : (planes + 1,) controls at the start and their rates.
+    c, rate : Controls at the start and their rates.
     h : Step [s].
-    stages : (6, 12) scratch; row 5 also carries the controls, so planes + 1 <= 12.
+    stages : (6, 12) scratch; row 5 also carries the controls, so at most 12 of them.
     """
     k1, k2, k3, k4, z, moved = stages[0], stages[1], stages[2], stages[3], stages[4], stages[5]
     rhs(m, y, c, work, k1)

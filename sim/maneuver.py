@@ -1,8 +1,9 @@
-"""Fixed-step maneuver loop: autopilot, mixer, actuators, zigzag reversals as events.
+"""Fixed-step maneuver loop: autopilot, mixer, actuators, programmes of commands with events.
 
-The vehicle moves under RK4 between control samples; the planes move at constant rate
-within a sample, towards their command, within rate and angle limits. A zigzag reverses
-when the checked angle reaches its check value: the crossing is located inside the step.
+The vehicle moves under RK4 between control samples; planes, revolutions and tanks move at
+constant rate within a sample, towards their command, within their limits. A zigzag reverses
+when the checked angle reaches its check value, a step of a programme ends with its event:
+both are located inside the time step.
 """
 
 from __future__ import annotations
@@ -12,24 +13,31 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
+from sim.events import HORIZONTAL, REVOLUTIONS, RUN, VERTICAL, Programme, Progress, advance, progress, step_past, watch
 from sim.kernel import Model, Work, rk4, workspace
 
-FIXED, PID, ZIGZAG = 0, 1, 2
-VERTICAL, HORIZONTAL = 0, 1
-# Time [s] to which a zigzag reversal is located.
+FIXED, PID, ZIGZAG, PROGRAMME, YAW_RATE = 0, 1, 2, 3, 4
+N_COMMANDS, N_INTEGRALS = 5, 10
+# Time [s] to which an event is located.
 _EVENT_TOLERANCE = 1e-10
 
 
 class Settings(NamedTuple):
     """What commands the boat.
 
-    law : (2,) law of dV and dH (``FIXED``, ``PID``, ``ZIGZAG``).
+    law : (2,) law of dV and dH (``FIXED``, ``PID``, ``ZIGZAG``, ``PROGRAMME``).
     value : (2,) fixed command or first zigzag command, signed [rad].
     check : (2,) zigzag check angle [rad].
     trim : (2,) command at the initial equilibrium [rad].
     gains : (2, 6) P I D on depth [rad/m] and pitch [rad/rad], and on sway and yaw.
+    yaw_rate_gains : (6,) P I D of dH on the yaw rate [rad per rad/s], then zeros.
     target : (4,) depth of the origin, pitch, earth y, heading.
-    speed_law : ``FIXED`` or ``PID``; speed_target [m/s], speed_gains P I D [rps per m/s].
+    speed_law : ``FIXED``, ``PID`` or ``PROGRAMME``; speed_target [m/s], speed_gains P I D
+        [rps per m/s].
+    tank_law : (2,) of ballast and trim tank, ``FIXED`` or ``PID``; tank_start : (2,) at the
+        start, kept when fixed [kg, m]; tank_gains : (2, 6) P I D on depth and pitch;
+        tank_limit, tank_rate : (2,).
+    programme : Steps and events.
     """
 
     law: np.ndarray
@@ -37,6 +45,7 @@ class Settings(NamedTuple):
     check: np.ndarray
     trim: np.ndarray
     gains: np.ndarray
+    yaw_rate_gains: np.ndarray
     target: np.ndarray
     speed_law: int
     speed_target: float
@@ -48,6 +57,12 @@ class Settings(NamedTuple):
     n_limit: np.ndarray
     n_rate: float
     command_limit: np.ndarray
+    tank_law: np.ndarray
+    tank_start: np.ndarray
+    tank_gains: np.ndarray
+    tank_limit: np.ndarray
+    tank_rate: np.ndarray
+    programme: Programme
 
 
 @njit(cache=True, error_model="numpy")
@@ -56,18 +71,25 @@ def _clip(x: float, low: float, high: float) -> float:
 
 
 @njit(cache=True, error_model="numpy")
-def _pid(s: Settings, axis: int, errors: np.ndarray, rates: np.ndarray, integrals: np.ndarray, dt: float) -> float:
+def _pid(
+    g: np.ndarray,
+    trim: float,
+    limit: float,
+    errors: np.ndarray,
+    rates: np.ndarray,
+    integrals: np.ndarray,
+    dt: float,
+) -> float:
     """One loop pair; integrators stop while the command is limited (anti-windup)."""
-    g = s.gains[axis]
-    command = s.trim[axis]
+    command = trim
     for k in range(2):
-        trial = integrals[2 * axis + k] + errors[k] * dt
+        trial = integrals[k] + errors[k] * dt
         command += g[3 * k] * errors[k] + g[3 * k + 1] * trial + g[3 * k + 2] * rates[k]
-    limited = _clip(command, -s.command_limit[axis], s.command_limit[axis])
+    limited = _clip(command, -limit, limit)
     for k in range(2):
         pushes = g[3 * k + 1] * errors[k] * (command - limited) > 0.0
         if not pushes:
-            integrals[2 * axis + k] += errors[k] * dt
+            integrals[k] += errors[k] * dt
     return limited
 
 
@@ -76,34 +98,72 @@ def autopilot(
     s: Settings,
     y: np.ndarray,
     dy: np.ndarray,
-    sense: float,
+    run: Progress,
     integrals: np.ndarray,
     dt: float,
     command: np.ndarray,
 ) -> None:
-    """Commands dV, dH [rad] and n [1/s] of this sample, Eqs. (9)-(10).
+    """Commands dV, dH [rad], n [1/s], ballast [kg] and trim [m] of this sample, Eqs. (9)-(11).
 
     dV = P_z (z - z_t) + P_theta (theta_t - theta) + ..., dH = P_y (y_t - y) +
-    P_psi (psi_t - psi) + ...: positive gains steer back in the program frame.
+    P_psi (psi_t - psi) + ...: positive gains steer back in the program frame. Too deep,
+    ballast is pumped out; bow up, the trim tank moves forward.
     """
     errors = np.empty(2)
     rates = np.empty(2)
+    p = s.programme
     for axis in range(2):
-        if s.law[axis] == FIXED:
-            command[axis] = s.value[axis]
-        elif s.law[axis] == ZIGZAG:
-            command[axis] = sense * s.value[axis]
+        law, value, far, turn = s.law[axis], s.value[axis], 0.0, 0.0
+        if law == PROGRAMME:
+            k = p.first[axis] + run.at[axis]
+            law, value, far, turn = p.mode[k], p.value[k], p.shift[k, 0], p.shift[k, 1]
+        limit = s.command_limit[axis]
+        own = integrals[2 * axis : 2 * axis + 2]
+        if law == FIXED:
+            command[axis] = value
+        elif law == ZIGZAG:
+            command[axis] = run.sense[0] * value
+        elif law == YAW_RATE:
+            errors[0], errors[1] = turn - y[5], 0.0
+            rates[0], rates[1] = -dy[5], 0.0
+            command[axis] = _pid(s.yaw_rate_gains, s.trim[axis], limit, errors, rates, integrals[8:10], dt)
         elif axis == VERTICAL:
-            errors[0], errors[1] = y[8] - s.target[0], s.target[1] - y[10]
+            errors[0], errors[1] = y[8] - (s.target[0] + far), (s.target[1] + turn) - y[10]
             rates[0], rates[1] = dy[8], -dy[10]
-            command[axis] = _pid(s, axis, errors, rates, integrals, dt)
+            command[axis] = _pid(s.gains[axis], s.trim[axis], limit, errors, rates, own, dt)
         else:
-            errors[0], errors[1] = s.target[2] - y[7], s.target[3] - y[11]
+            errors[0], errors[1] = (s.target[2] + far) - y[7], (s.target[3] + turn) - y[11]
             rates[0], rates[1] = -dy[7], -dy[11]
-            command[axis] = _pid(s, axis, errors, rates, integrals, dt)
+            command[axis] = _pid(s.gains[axis], s.trim[axis], limit, errors, rates, own, dt)
+    _revolutions(s, y, dy, run, integrals, dt, command)
+    for tank in range(2):
+        command[3 + tank] = s.tank_start[tank]
+        if s.tank_law[tank] == PID:
+            errors[0], rates[0] = s.target[0] - y[8], -dy[8]
+            errors[1], rates[1] = y[10] - s.target[1], dy[10]
+            own = integrals[5 + 2 * tank : 7 + 2 * tank]
+            command[3 + tank] = _pid(s.tank_gains[tank], s.tank_start[tank], s.tank_limit[tank], errors, rates, own, dt)
+
+
+@njit(cache=True, error_model="numpy")
+def _revolutions(
+    s: Settings,
+    y: np.ndarray,
+    dy: np.ndarray,
+    run: Progress,
+    integrals: np.ndarray,
+    dt: float,
+    command: np.ndarray,
+) -> None:
+    """Revolutions that hold the speed ahead, Eq. (9), or those of the programme."""
+    law = s.speed_law
     command[2] = s.revolutions
-    if s.speed_law == PID:
-        error = s.speed_target - np.sqrt(y[0] ** 2 + y[1] ** 2 + y[2] ** 2)
+    if law == PROGRAMME:
+        k = s.programme.first[REVOLUTIONS] + run.at[REVOLUTIONS]
+        law = s.programme.mode[k]
+        command[2] = _clip(s.programme.value[k], s.n_limit[0], s.n_limit[1])
+    if law == PID:
+        error = s.speed_target - y[0]
         trial = integrals[4] + error * dt
         wanted = s.revolutions + s.speed_gains[0] * error + s.speed_gains[1] * trial
         wanted -= s.speed_gains[2] * dy[0]
@@ -114,13 +174,17 @@ def autopilot(
 
 @njit(cache=True, error_model="numpy")
 def _actuators(s: Settings, command: np.ndarray, c: np.ndarray, dt: float, rate: np.ndarray) -> None:
-    """Rates of planes and revolutions towards the mixed command, Eq. (1)."""
+    """Rates of planes, revolutions and tanks towards the mixed command, Eq. (1)."""
     n_planes = s.mixer.shape[0]
     for i in range(n_planes):
         wanted = s.mixer[i, 0] * command[0] + s.mixer[i, 1] * command[1]
         wanted = _clip(wanted, -s.plane_limit[i], s.plane_limit[i])
         rate[i] = _clip((wanted - c[i]) / dt, -s.plane_rate[i], s.plane_rate[i])
     rate[n_planes] = _clip((command[2] - c[n_planes]) / dt, -s.n_rate, s.n_rate)
+    for tank in range(c.size - n_planes - 1):
+        i = n_planes + 1 + tank
+        wanted = _clip(command[3 + tank], -s.tank_limit[tank], s.tank_limit[tank])
+        rate[i] = _clip((wanted - c[i]) / dt, -s.tank_rate[tank], s.tank_rate[tank])
 
 
 @njit(cache=True, error_model="numpy")
@@ -134,62 +198,102 @@ def _past_check(s: Settings, y: np.ndarray, sense: float) -> float:
 
 
 @njit(cache=True, error_model="numpy")
+def _past(s: Settings, run: Progress, y: np.ndarray, t: float) -> float:
+    """Not negative once a zigzag check or an event of a programme has happened."""
+    found = _past_check(s, y, run.sense[0])
+    if s.programme.events.shape[0]:
+        for axis in range(RUN + 1):
+            found = max(found, step_past(s.programme, run, axis, y, t))
+    return found
+
+
+@njit(cache=True, error_model="numpy")
 def _crossing(
     m: Model,
     s: Settings,
+    run: Progress,
     y: np.ndarray,
     c: np.ndarray,
     rate: np.ndarray,
+    t: float,
     h: float,
-    sense: float,
     work: Work,
     stages: np.ndarray,
     trial: np.ndarray,
 ) -> float:
-    """Time into the step at which the checked angle reaches the check value."""
+    """Time into the step from ``t`` at which the first event happens."""
     low, high = 0.0, h
     while high - low > _EVENT_TOLERANCE:
         middle = 0.5 * (low + high)
         rk4(m, y, c, rate, middle, work, stages, trial)
-        if _past_check(s, trial, sense) >= 0.0:
+        if _past(s, run, trial, t + middle) >= 0.0:
             high = middle
         else:
             low = middle
     return high
 
 
+@njit(cache=True, error_model="numpy")
+def _next_steps(
+    s: Settings, run: Progress, y: np.ndarray, t: float, command: np.ndarray, log: np.ndarray, logged: int
+) -> tuple[int, bool]:
+    """Take every programme past its event to its next step; fixed commands act at once.
+
+    Returns
+    -------
+    (rows of the log, whether the run ends): time, axis and number of the step that ended.
+    """
+    p, ends = s.programme, False
+    for axis in range(RUN + 1):
+        while not ends and step_past(p, run, axis, y, t) >= 0.0:
+            if logged < log.shape[0]:
+                log[logged, 0], log[logged, 1], log[logged, 2] = t, axis, run.at[axis]
+                logged += 1
+            ends = not advance(p, run, axis, y, t)
+            k = p.first[axis] + run.at[axis]
+            if axis < RUN and p.mode[k] == FIXED:
+                command[axis] = p.value[k]
+                if axis == REVOLUTIONS:
+                    command[axis] = _clip(p.value[k], s.n_limit[0], s.n_limit[1])
+    return logged, ends
+
+
 @njit(cache=True, error_model="numpy", nogil=True)
 def run(
     m: Model,
     s: Settings,
-    y0: np.ndarray,
-    c0: np.ndarray,
+    state: Progress,
+    y: np.ndarray,
+    c: np.ndarray,
     dt: float,
     steps: int,
     every: int,
     work: Work,
     record: np.ndarray,
     executes: np.ndarray,
-) -> tuple[int, int]:
+    log: np.ndarray,
+) -> tuple[int, int, int, float]:
     """Integrate a maneuver.
 
     Parameters
     ----------
     m, s : Model and Settings.
-    y0 : (12,) initial state; c0 : (planes + 1,) initial controls.
+    state : Progress at the start; left as it is at the end.
+    y : (12,) initial state, left final; c : initial controls, left final.
     dt : Control sample and integration step [s].
     steps, every : Number of samples, and samples between records.
-    record : (rows, 1 + 12 + planes + 1 + 2) filled with time, state, controls, commands.
+    record : (rows, 1 + 12 + controls + 2) filled with time, state, controls, commands.
     executes : (k, 2) filled with time and command [rad] of each zigzag execute.
+    log : (k, 3) filled with time, axis and step of each step of a programme that ended.
 
     Returns
     -------
-    (rows recorded, executes recorded).
+    (rows recorded, executes recorded, rows of the log, time at the end [s]).
     """
-    y, c, dy = y0.copy(), c0.copy(), np.zeros(12)
-    stages, trial = np.zeros((6, 12)), np.zeros(12)
-    rate, command, integrals = np.zeros(c.size), np.zeros(3), np.zeros(5)
-    sense, rows, events = 1.0, 0, 0
+    dy, stages, trial = np.zeros(12), np.zeros((6, 12)), np.zeros(12)
+    rate, command, integrals = np.zeros(c.size), np.zeros(N_COMMANDS), np.zeros(N_INTEGRALS)
+    rows, events, logged, ends = 0, 0, 0, False
+    programmed = s.programme.events.shape[0] > 0
     zigzag = s.law[0] == ZIGZAG or s.law[1] == ZIGZAG
     axis = HORIZONTAL if s.law[1] == ZIGZAG else VERTICAL
     if zigzag:
@@ -198,7 +302,9 @@ def run(
         rk4(m, y, c, rate, 0.0, work, stages, trial)
         for i in range(12):
             dy[i] = stages[0, i]
-        autopilot(s, y, dy, sense, integrals, dt, command)
+        if programmed:
+            watch(s.programme, state, y, dy, step * dt)
+        autopilot(s, y, dy, state, integrals, dt, command)
         if step % every == 0 and rows < record.shape[0]:
             record[rows, 0] = step * dt
             record[rows, 1:13] = y
@@ -206,44 +312,71 @@ def run(
             record[rows, 13 + c.size : 15 + c.size] = command[:2]
             rows += 1
         if step == steps or not np.isfinite(y).all():
-            break
+            return rows, events, logged, step * dt
         _actuators(s, command, c, dt, rate)
         left = dt
         while left > 0.0:
+            now = step * dt + (dt - left)
             rk4(m, y, c, rate, left, work, stages, trial)
             part = left
-            reversed_now = zigzag and _past_check(s, trial, sense) >= 0.0
-            if reversed_now:
-                part = _crossing(m, s, y, c, rate, left, sense, work, stages, trial)
+            happens = (zigzag or programmed) and _past(s, state, trial, now + left) >= 0.0
+            if happens:
+                part = _crossing(m, s, state, y, c, rate, now, left, work, stages, trial)
                 rk4(m, y, c, rate, part, work, stages, trial)
             y[:] = trial
             for i in range(c.size):
                 c[i] += part * rate[i]
             left -= part
-            if reversed_now:
-                sense = -sense
-                command[axis] = sense * s.value[axis]
+            if not happens:
+                continue
+            now = step * dt + (dt - left)
+            if zigzag and _past_check(s, y, state.sense[0]) >= 0.0:
+                state.sense[0] = -state.sense[0]
+                command[axis] = state.sense[0] * s.value[axis]
                 if events < executes.shape[0]:
-                    executes[events, 0] = step * dt + (dt - left)
+                    executes[events, 0] = now
                     executes[events, 1] = command[axis]
                 events += 1
-                _actuators(s, command, c, max(left, _EVENT_TOLERANCE), rate)
-    return rows, events
+            if programmed:
+                logged, ends = _next_steps(s, state, y, now, command, log, logged)
+                if ends:
+                    return rows, events, logged, now
+            _actuators(s, command, c, max(left, _EVENT_TOLERANCE), rate)
+    return rows, events, logged, steps * dt
+
+
+class Flown(NamedTuple):
+    """What a run leaves.
+
+    record : (rows, 15 + controls) as in ``run``, up to the last finite row.
+    executes : (k, 2) time [s] and command [rad] of each zigzag execute.
+    log : (k, 3) time [s], axis and number of each step of a programme that ended.
+    end : (13,) time [s] and state at the end of the run.
+    """
+
+    record: np.ndarray
+    executes: np.ndarray
+    log: np.ndarray
+    end: np.ndarray
+
+
+def fly_logged(
+    model: Model, settings: Settings, y0: np.ndarray, c0: np.ndarray, dt: float, steps: int, every: int
+) -> Flown:
+    """``run`` with its arrays allocated."""
+    record = np.zeros((steps // every + 1, 15 + c0.size))
+    executes, log = np.zeros((256, 2)), np.zeros((256, 3))
+    y, c, state = y0.copy(), c0.copy(), progress(settings.programme, y0)
+    rows, events, logged, end = run(
+        model, settings, state, y, c, dt, steps, every, workspace(len(settings.mixer)), record, executes, log
+    )
+    flown = record[:rows]
+    finite = flown[np.isfinite(flown).all(axis=1)]
+    return Flown(finite, executes[: min(events, len(executes))], log[:logged], np.append(end, y))
 
 
 def fly(
     model: Model, settings: Settings, y0: np.ndarray, c0: np.ndarray, dt: float, steps: int, every: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """``run`` with its arrays allocated.
-
-    Returns
-    -------
-    record : (rows, 15 + planes + 1) as in ``run``, up to the last finite row.
-    executes : (k, 2) time [s] and command [rad] of each zigzag execute.
-    """
-    record = np.zeros((steps // every + 1, 15 + c0.size))
-    executes = np.zeros((256, 2))
-    work = workspace(c0.size - 1)
-    rows, events = run(model, settings, y0, c0, dt, steps, every, work, record, executes)
-    flown = record[:rows]
-    return flown[np.isfinite(flown).all(axis=1)], executes[: min(events, len(executes))]
+    """Record and zigzag executes of ``fly_logged``."""
+    return fly_logged(model, settings, y0, c0, dt, steps, every)[:2]

@@ -161,6 +161,12 @@ class _Flat:
             self.coefficient.append((self.output(member), scale, factors))
 
 
+def with_tanks(model: kernel.Model, vehicle: Vehicle) -> kernel.Model:
+    """The model with ballast and trim tank in use; its controls have two more entries."""
+    assert vehicle.tanks is not None
+    return model._replace(tank=_triple(vehicle.tanks.ballast.position.value))
+
+
 def _batches(members: list[Coefficient]) -> Iterable[list[Coefficient]]:
     for i in range(0, len(members), kernel.WIDTH):
         yield members[i : i + kernel.WIDTH]
@@ -192,9 +198,10 @@ def assemble(coefficients: Coefficients, environment: Environment) -> kernel.Mod
     particulars = vehicle.particulars
     if len(flat.axis) > kernel.MAX_AXES:
         raise ValueError(f"{vehicle.name}: {len(flat.axis)} table axes, at most {kernel.MAX_AXES}")
+    total = mass + added_mass_matrix(coefficients, environment)
     planes = [[*p.position, *p.lift_axis] for p in vehicle.planes]
     return kernel.Model(
-        inverse_mass=np.linalg.inv(mass + added_mass_matrix(coefficients, environment)),
+        inverse_mass=np.linalg.inv(total),
         mass=particulars.mass.value,
         weight=particulars.mass.value * environment.gravity,
         buoyancy=particulars.displaced_mass.value * environment.gravity,
@@ -212,4 +219,6 @@ def assemble(coefficients: Coefficients, environment: Environment) -> kernel.Mod
         data=np.concatenate(flat.data) if flat.data else np.zeros((0, kernel.WIDTH)),
         terms=np.array([[k[0], *k[2]] for k in flat.coefficient], dtype=np.int64).reshape(-1, 1 + MAX_FACTORS),
         scale=np.array([k[1] for k in flat.coefficient], dtype=float),
+        mass_matrix=total,
+        tank=(),
     )

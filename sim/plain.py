@@ -33,13 +33,14 @@ def _weights(nodes: Array, rule: int, x: float) -> tuple[int, Array]:
 
 def features(m: kernel.Model, y: Array, c: Array) -> Array:
     """Feature vector as ``kernel.fill_features`` fills it, the constant 1 last."""
-    n = float(c[-1])
+    n_planes = len(m.planes)
+    n = float(c[n_planes])
     advance = (1.0 - m.wake) * y[0] / (n * m.diameter) if n else 0.0
     boat = boat_features(list(y[:3]), list(y[3:6]), y[8] + m.sail_top, n, advance)
     through = y[:3] + np.cross(y[3:6], m.planes[:, :3])
     speed = np.linalg.norm(through, axis=1)
     sine = -np.einsum("ij,ij->i", through, m.planes[:, 3:]) / np.where(speed > 0.0, speed, 1.0)
-    plane = np.column_stack([speed, c[:-1] + np.arcsin(np.clip(sine, -1.0, 1.0)), c[:-1]])
+    plane = np.column_stack([speed, c[:n_planes] + np.arcsin(np.clip(sine, -1.0, 1.0)), c[:n_planes]])
     return np.concatenate([[boat[k] for k in BOAT_FEATURES], plane.reshape(-1), [1.0]])
 
 
@@ -74,11 +75,23 @@ def rhs(m: kernel.Model, y: Array, c: Array) -> Array:
     ixx, iyy, izz, ixy, ixz, iyz = m.inertia
     inertia = np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]])
     r_g, r_b, down = np.array(m.r_g), np.array(m.r_b), rotation[2]
+    mass, weight, inverse = m.mass, m.weight, m.inverse_mass
+    if m.tank:
+        ballast, shift, tank = c[-2], c[-1], np.array(m.tank)
+        moment = m.mass * np.array([shift, 0.0, 0.0]) + ballast * tank
+        lever = cross_matrix(tank)
+        inertia = inertia - ballast * lever @ lever
+        own = cross_matrix(moment)
+        inverse = np.linalg.inv(
+            m.mass_matrix + np.block([[ballast * np.eye(3), -own], [own, -ballast * lever @ lever]])
+        )
+        mass += ballast
+        r_g, weight = (m.mass * r_g + moment) / mass, weight * mass / m.mass
     swing = np.cross(omega, v)
-    force = (m.weight - m.buoyancy) * down - m.mass * (swing + np.cross(omega, np.cross(omega, r_g)))
-    moment = np.cross(m.weight * r_g - m.buoyancy * r_b, down)
-    moment = moment - np.cross(omega, inertia @ omega) - m.mass * cross_matrix(r_g) @ swing
-    acceleration = m.inverse_mass @ (loads(m, features(m, y, c)) + np.concatenate([force, moment]))
+    force = (weight - m.buoyancy) * down - mass * (swing + np.cross(omega, np.cross(omega, r_g)))
+    moment = np.cross(weight * r_g - m.buoyancy * r_b, down)
+    moment = moment - np.cross(omega, inertia @ omega) - mass * cross_matrix(r_g) @ swing
+    acceleration = inverse @ (loads(m, features(m, y, c)) + np.concatenate([force, moment]))
     tangent = st / ct if ct else math.inf
     euler = np.array([[1.0, sf * tangent, cf * tangent], [0.0, cf, -sf], [0.0, sf / ct, cf / ct]])
     return np.concatenate([acceleration, rotation @ v, euler @ omega])

@@ -11,8 +11,10 @@ from numpy.typing import NDArray
 from sim import maneuver
 from sim.case import Case
 from sim.coefficients import Coefficients
+from sim.commands import compile_programme, law_code
+from sim.errors import InputError
 from sim.kernel import Model
-from sim.model import Environment, assemble
+from sim.model import Environment, assemble, with_tanks
 from sim.trim import Trim, self_propulsion
 from sim.vehicle import Vehicle
 
@@ -22,8 +24,8 @@ _STATES = ("u", "v", "w", "p", "q", "r", "x", "y", "z", "phi", "theta", "psi")
 # Channels a reference may hold, with the unit of the simulation.
 CHANNELS = dict.fromkeys(("u", "v", "w", "U"), "m/s") | dict.fromkeys(("p", "q", "r"), "rad/s")
 CHANNELS |= dict.fromkeys(("x", "y", "z", "D0"), "m") | dict.fromkeys(("phi", "theta", "psi"), "rad")
-CHANNELS |= {"u_over_U0": "-", "dz_over_L0": "-", "n": "1/s"}
-_LAWS = {"fixed": maneuver.FIXED, "pid": maneuver.PID, "zigzag": maneuver.ZIGZAG}
+CHANNELS |= {"u_over_U0": "-", "dz_over_L0": "-", "n": "1/s", "ballast": "kg", "trim_tank": "m"}
+TANKS = ("ballast", "trim_tank")
 
 
 @dataclass(frozen=True)
@@ -32,12 +34,16 @@ class Simulation:
 
     Attributes
     ----------
-    columns : Names of the columns of ``record``: t, the 12 states, planes, n, dV, dH.
+    columns : Names of the columns of ``record``: t, the 12 states, planes, n, ballast and
+        trim_tank when in use, dV, dH.
     record : (rows, columns).
     executes : (k, 2) time [s] and command [rad] of each zigzag execute.
     trim : The initial equilibrium, or None.
     depth_offset : D0 = z + depth_offset.
     length : Reference length L [m].
+    steps : (k, 3) time [s], axis (dV, dH, n, run) and number of each programme step that ended.
+    end : (13,) time [s] and state at the end of the run, which an event may place between
+        two records.
     """
 
     columns: tuple[str, ...]
@@ -46,13 +52,20 @@ class Simulation:
     trim: Trim | None
     depth_offset: float
     length: float
+    steps: Array
+    end: Array
 
     def __getitem__(self, column: str) -> Array:
-        """One column by name; ``U``, ``D0``, ``u_over_U0`` and ``dz_over_L0`` are derived."""
+        """One column by name; ``U``, ``D0``, ``s``, ``u_over_U0`` and ``dz_over_L0`` are derived.
+
+        ``s`` is the length of the path over ground, in the horizontal plane [m].
+        """
         if column == "U":
             return np.sqrt(self["u"] ** 2 + self["v"] ** 2 + self["w"] ** 2)
         if column == "D0":
             return self["z"] + self.depth_offset
+        if column == "s":
+            return np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(self["x"]), np.diff(self["y"])))])
         if column == "u_over_U0":
             return self["u"] / self["U"][0]
         if column == "dz_over_L0":
@@ -74,6 +87,17 @@ def plane_limits(vehicle: Vehicle) -> tuple[Array, Array]:
     return limit, np.radians([p.rate_degps for p in vehicle.planes])
 
 
+def tank_limits(vehicle: Vehicle) -> tuple[float, float]:
+    """Largest ballast [kg] and shift of the centre of gravity [m]; zero without tanks."""
+    return (vehicle.tanks.ballast.limit.value, vehicle.tanks.trim.limit.value) if vehicle.tanks else (0.0, 0.0)
+
+
+def _held(case: Case) -> tuple[float, float]:
+    """Ballast and shift of the centre of gravity that the case gives."""
+    ballast, trim = case.command.ballast, case.command.trim_tank
+    return ballast.value if ballast else 0.0, trim.value if trim else 0.0
+
+
 def initial_state(case: Case, vehicle: Vehicle, model: Model) -> tuple[Array, Array, Trim | None]:
     """State, controls and the equilibrium (if the case asks for one).
 
@@ -85,12 +109,33 @@ def initial_state(case: Case, vehicle: Vehicle, model: Model) -> tuple[Array, Ar
     first = case.initial
     if first.state == "self_propulsion":
         mixer = mixer_of(vehicle, case.sail_planes)
-        trim = self_propulsion(model, mixer, first.speed_mps, first.depth_m, plane_limits(vehicle)[0])
+        limits = plane_limits(vehicle)[0]
+        trim = self_propulsion(
+            model, mixer, first.speed_mps, first.depth_m, limits, first.trim, tank_limits(vehicle), _held(case)
+        )
         return trim.state.copy(), trim.controls.copy(), trim
     state = np.zeros(12)
     state[0], state[8] = first.speed_mps, first.depth_m - model.sail_top
     state[9], state[10] = math.radians(first.heel_deg), math.radians(first.pitch_deg)
-    return state, np.append(np.zeros(len(vehicle.planes)), first.revolutions_rps or 0.0), None
+    tanks = _held(case) if model.tank else ()
+    return state, np.array([*np.zeros(len(vehicle.planes)), first.revolutions_rps or 0.0, *tanks]), None
+
+
+def uses_tanks(case: Case) -> bool:
+    """Whether a case uses ballast or the trim tank."""
+    return bool(case.command.ballast or case.command.trim_tank or case.initial.trim != "planes")
+
+
+def _tank_settings(case: Case, vehicle: Vehicle, controls: Array) -> tuple[Array, Array, Array, Array, Array]:
+    """Laws, start, gains, limits and rates of ballast and trim tank."""
+    commands = (case.command.ballast, case.command.trim_tank)
+    laws = np.array([law_code(c.law) if c else maneuver.FIXED for c in commands])
+    gains = np.array([c.gains() if c else np.zeros(6) for c in commands])
+    if vehicle.tanks is None or not uses_tanks(case):
+        return laws, np.zeros(2), gains, np.zeros(2), np.zeros(2)
+    tanks = (vehicle.tanks.ballast, vehicle.tanks.trim)
+    limit, rate = ([getattr(t, k).value for t in tanks] for k in ("limit", "rate"))
+    return laws, controls[-2:].copy(), gains, np.array(limit), np.array(rate)
 
 
 def settings_of(case: Case, vehicle: Vehicle, state: Array, controls: Array, trim: Trim | None) -> maneuver.Settings:
@@ -98,50 +143,90 @@ def settings_of(case: Case, vehicle: Vehicle, state: Array, controls: Array, tri
     dv, dh, n = case.command.dV, case.command.dH, case.command.n
     limit, rate = plane_limits(vehicle)
     value = [math.radians(c.first_deg if c.law == "zigzag" else c.value_deg) for c in (dv, dh)]
+    revolutions = float(controls[len(vehicle.planes)])
+    commands = (trim.dV, trim.dH) if trim else (0.0, 0.0)
+    tank_law, tank_start, tank_gains, tank_limit, tank_rate = _tank_settings(case, vehicle, controls)
+    sail_top = vehicle.particulars.sail_top.value[2]
     return maneuver.Settings(
-        law=np.array([_LAWS[dv.law], _LAWS[dh.law]]),
+        law=np.array([law_code(dv.law), law_code(dh.law)]),
         value=np.array(value),
         check=np.radians([dv.check_deg, dh.check_deg]),
-        trim=np.array([trim.dV, trim.dH]) if trim else np.zeros(2),
+        trim=np.array(commands),
         gains=np.array([dv.gains("z", "theta"), dh.gains("y", "psi")]),
+        yaw_rate_gains=np.array([dh.P_r, dh.I_r, dh.D_r, 0.0, 0.0, 0.0]),
         target=np.array([state[8], state[10], state[7], state[11]]),
-        speed_law=_LAWS[n.law],
-        speed_target=case.initial.speed_mps,
+        speed_law=law_code(n.law),
+        speed_target=float(state[0]),
         speed_gains=np.array([n.P_u, n.I_u, n.D_u]),
-        revolutions=float(controls[-1]),
+        revolutions=revolutions,
         mixer=mixer_of(vehicle, case.sail_planes),
         plane_limit=limit,
         plane_rate=rate,
-        n_limit=np.array(vehicle.propeller.limits.value),
+        n_limit=np.array(n.limits_rps or vehicle.propeller.limits.value),
         n_rate=vehicle.propeller.rate.value,
         command_limit=np.radians([dv.limit_deg, dh.limit_deg]),
+        tank_law=tank_law,
+        tank_start=tank_start,
+        tank_gains=tank_gains,
+        tank_limit=tank_limit,
+        tank_rate=tank_rate,
+        programme=compile_programme(case.command, case.run.stop, commands, revolutions, sail_top),
     )
 
 
-def simulate(case: Case, coefficients: Coefficients) -> Simulation:
+def simulate(case: Case, coefficients: Coefficients, model: Model | None = None) -> Simulation:
     """Fly a case.
 
     Parameters
     ----------
     case : From ``load_case``.
     coefficients : Of the case's vehicle.
+    model : What ``model_of`` gave for them, where it is flown more than once.
 
     Returns
     -------
-    Simulation; the record ends early when the state is no longer finite.
+    Simulation; the record ends early when the state is no longer finite, or with an event.
 
     Raises
     ------
     sim.trim.NoEquilibrium
         When the case starts from self-propulsion and there is none.
+    InputError
+        When the case uses tanks that the vehicle does not have.
     """
     vehicle = coefficients.vehicle
-    environment = Environment(case.environment.density_kgpm3, case.environment.gravity_mps2)
-    model = assemble(coefficients, environment)
+    if model is None:
+        model = model_of(case, coefficients)
     state, controls, trim = initial_state(case, vehicle, model)
     settings = settings_of(case, vehicle, state, controls, trim)
     dt = case.run.step_s
     steps, every = round(case.run.duration_s / dt), max(1, round(case.run.record_s / dt))
-    record, executes = maneuver.fly(model, settings, state, controls, dt, steps, every)
-    columns = ("t", *_STATES, *[p.name for p in vehicle.planes], "n", "dV", "dH")
-    return Simulation(columns, record, executes, trim, model.sail_top, vehicle.particulars.length.value)
+    flown = maneuver.fly_logged(model, settings, state, controls, dt, steps, every)
+    tanks = TANKS if model.tank else ()
+    return Simulation(
+        columns=("t", *_STATES, *[p.name for p in vehicle.planes], "n", *tanks, "dV", "dH"),
+        record=flown.record,
+        executes=flown.executes,
+        trim=trim,
+        depth_offset=model.sail_top,
+        length=vehicle.particulars.length.value,
+        steps=flown.log,
+        end=flown.end,
+    )
+
+
+def model_of(case: Case, coefficients: Coefficients) -> Model:
+    """The compiled model in the environment of a case, with tanks when the case uses them.
+
+    Raises
+    ------
+    InputError
+        When the vehicle has no tanks.
+    """
+    vehicle = coefficients.vehicle
+    model = assemble(coefficients, Environment(case.environment.density_kgpm3, case.environment.gravity_mps2))
+    if not uses_tanks(case):
+        return model
+    if vehicle.tanks is None:
+        raise InputError(f"case {case.name}", f"tanks, which {vehicle.name} does not have", "a vehicle with [tanks]")
+    return with_tanks(model, vehicle)

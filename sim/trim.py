@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,9 +24,12 @@ class Trim:
     Attributes
     ----------
     state : (12,) state vector of the kernel.
-    controls : (planes + 1,) deflections [rad] and n [1/s].
+    controls : (planes + 1,) deflections [rad] and n [1/s]; with tanks in use also ballast
+        [kg] and shift of the centre of gravity [m].
     dV, dH : Commands that hold it [rad].
     residual : Largest acceleration left [m/s^2 or rad/s^2].
+    limited : Which of ballast and trim_tank stand at their limit, so that pitch or planes
+        hold what they cannot.
     """
 
     state: Array
@@ -34,32 +37,34 @@ class Trim:
     dV: float
     dH: float
     residual: float
+    limited: tuple[str, ...] = ()
 
 
-def self_propulsion(model: kernel.Model, mixer: Array, speed: float, depth: float, plane_limit: Array) -> Trim:
-    """Solve revolutions, plane commands, pitch, heel and drift for straight level flight.
+# What keeps the boat level, two unknowns each; the rest of pitch, dV and tanks is zero.
+_LEVEL = {"planes": ("pitch", "dV"), "ballast": ("dV", "ballast"), "tanks": ("ballast", "trim_tank")}
+# What takes over when a tank is at its limit.
+_NEXT = {"trim_tank": "dV", "ballast": "pitch"}
+TANK_NAMES = ("ballast", "trim_tank")
 
-    Parameters
-    ----------
-    model : The boat.
-    mixer : (planes, 2) shares of dV and dH, Eq. (1).
-    speed : Speed through the water [m/s].
-    depth : D0, depth of the sail top [m].
-    plane_limit : (planes,) [rad].
 
-    Raises
-    ------
-    NoEquilibrium
-        When the six balances have no solution or a plane is beyond its limit.
+def _solve(
+    model: kernel.Model, mixer: Array, speed: float, depth: float, free: tuple[str, ...], values: dict[str, float]
+) -> tuple[Trim, str]:
+    """Root of the six balances over n, heel, drift, dH and the two unknowns ``free``.
+
+    Returns
+    -------
+    The state found and, if it is no equilibrium, what is wrong with it.
     """
-    work = kernel.workspace(mixer.shape[0])
-    derivative = np.zeros(12)
-    # Unknowns: n relative to U/D (an advance coefficient near one), pitch, dV, heel, drift,
-    # dH; earth velocity is horizontal.
+    work, derivative = kernel.workspace(mixer.shape[0]), np.zeros(12)
+    # n relative to U/D: an advance coefficient near one. Tanks by what balances 1 % of weight.
     reference = speed / model.diameter
+    size = {"pitch": 1.0, "dV": 1.0, "ballast": 0.01 * model.mass, "trim_tank": 1.0}
 
-    def build(x: Array) -> tuple[Array, Array]:
-        n, pitch, dv, heel, drift, dh = x
+    def build(x: Array) -> tuple[Array, Array, dict[str, float]]:
+        n, heel, drift, dh = x[:4]
+        level = values | {k: float(size[k] * v) for k, v in zip(free, x[4:], strict=True)}
+        pitch = level["pitch"]
         u = speed * np.cos(drift) * np.cos(pitch)
         v = speed * np.sin(drift)
         # Level flight: -sin(theta) u + sin(phi) cos(theta) v + cos(phi) cos(theta) w = 0.
@@ -68,25 +73,75 @@ def self_propulsion(model: kernel.Model, mixer: Array, speed: float, depth: floa
         state = np.zeros(12)
         state[:3] = u * scale, v * scale, w * scale
         state[8], state[9], state[10] = depth - model.sail_top, heel, pitch
-        return state, np.append(mixer @ np.array([dv, dh]), n * reference)
+        tanks = [level[k] for k in TANK_NAMES] if model.tank else []
+        return state, np.array([*(mixer @ np.array([level["dV"], dh])), n * reference, *tanks]), level
 
     def residual(x: Array) -> Array:
-        state, controls = build(x)
+        state, controls, _ = build(x)
         kernel.rhs(model, state, controls, work, derivative)
         return derivative[:6].copy()
 
     found = root(residual, np.array([1.2, 0.0, 0.0, 0.0, 0.0, 0.0]), method="hybr", tol=1e-13)
-    state, controls = build(found.x)
+    state, controls, level = build(found.x)
     left = float(np.abs(residual(found.x)).max())
+    wrong = ""
     if not np.isfinite(left) or left > 1e-8:
-        angles = ", ".join(f"{a:.1f}" for a in np.degrees(controls[:-1]))
-        raise NoEquilibrium(
-            f"no self-propulsion state at {speed:.4g} m/s and D0 = {depth:.4g} m; "
-            f"closest found: planes {angles} deg, pitch {np.degrees(state[10]):.1f} deg, n {controls[-1]:.3g} 1/s"
+        angles = ", ".join(f"{a:.1f}" for a in np.degrees(controls[: mixer.shape[0]]))
+        wrong = (
+            f"no self-propulsion state at {speed:.4g} m/s and D0 = {depth:.4g} m; closest found: planes {angles} deg, "
+            f"pitch {np.degrees(state[10]):.1f} deg, n {controls[mixer.shape[0]]:.3g} 1/s"
         )
-    if np.any(np.abs(controls[:-1]) > plane_limit):
-        raise NoEquilibrium(f"self-propulsion at {speed:.4g} m/s and D0 = {depth:.4g} m needs a plane beyond its limit")
     # The path is straight: heading such that the course is along earth x.
     kernel.rhs(model, state, controls, work, derivative)
     state[11] = -np.arctan2(derivative[7], derivative[6])
-    return Trim(state, controls, float(found.x[2]), float(found.x[5]), left)
+    return Trim(state, controls, level["dV"], float(found.x[3]), left), wrong
+
+
+def self_propulsion(
+    model: kernel.Model,
+    mixer: Array,
+    speed: float,
+    depth: float,
+    plane_limit: Array,
+    level: str = "planes",
+    tank_limit: tuple[float, float] | None = None,
+    held: tuple[float, float] = (0.0, 0.0),
+) -> Trim:
+    """Solve revolutions, heel, drift, dH and what keeps the boat level for straight flight.
+
+    Parameters
+    ----------
+    model : The boat.
+    mixer : (planes, 2) shares of dV and dH, Eq. (1).
+    speed : Speed through the water [m/s].
+    depth : D0, depth of the sail top [m].
+    plane_limit : (planes,) [rad].
+    level : ``planes``: pitch and dV are solved. ``ballast``: dV and ballast, pitch zero.
+        ``tanks``: ballast and trim tank, pitch and dV zero. A tank that would pass its limit
+        stands at it, and dV (for the trim tank) or the pitch (for ballast) is solved instead.
+    tank_limit : Largest ballast [kg] and shift of the centre of gravity [m].
+    held : Ballast and shift where they are not solved.
+
+    Raises
+    ------
+    NoEquilibrium
+        When the six balances have no solution or a plane is beyond its limit.
+    """
+    free: tuple[str, ...] = _LEVEL[level]
+    values = {"pitch": 0.0, "dV": 0.0} | dict(zip(TANK_NAMES, held, strict=True))
+    limits = dict(zip(TANK_NAMES, tank_limit or (np.inf, np.inf), strict=True))
+    limited: tuple[str, ...] = ()
+    while True:
+        found, wrong = _solve(model, mixer, speed, depth, free, values)
+        if wrong:
+            raise NoEquilibrium(wrong)
+        amounts = dict(zip(TANK_NAMES, found.controls[mixer.shape[0] + 1 :], strict=bool(model.tank)))
+        over = [k for k in reversed(TANK_NAMES) if k in free and abs(amounts[k]) > limits[k]]
+        if not over:
+            break
+        values[over[0]] = float(np.sign(amounts[over[0]])) * limits[over[0]]
+        free = tuple(_NEXT[k] if k == over[0] else k for k in free)
+        limited += (over[0],)
+    if np.any(np.abs(found.controls[: mixer.shape[0]]) > plane_limit):
+        raise NoEquilibrium(f"self-propulsion at {speed:.4g} m/s and D0 = {depth:.4g} m needs a plane beyond its limit")
+    return replace(found, limited=limited)

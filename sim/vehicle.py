@@ -104,6 +104,28 @@ class Sections(Data):
     centres: list[Section]
 
 
+class BallastTank(Data):
+    """Water taken in and pumped out: where, how much, how fast."""
+
+    position: Triple
+    limit: Number
+    rate: Number
+
+
+class TrimTank(Data):
+    """Water moved along the boat, as the shift of the centre of gravity: how far, how fast."""
+
+    limit: Number
+    rate: Number
+
+
+class Tanks(Data):
+    """Ballast and trim tank, Eq. (11)."""
+
+    ballast: BallastTank
+    trim: TrimTank
+
+
 class Axes(FrameData):
     """Declared directions of the body axes and what the origin is."""
 
@@ -123,6 +145,7 @@ class Vehicle(Data):
     propeller: Propeller
     planes: list[Plane] = Field(default_factory=list)
     sections: Sections | None = None
+    tanks: Tanks | None = None
 
     @field_validator("planes")
     @classmethod
@@ -144,6 +167,9 @@ class Vehicle(Data):
         data["frame"].update(x=frame.x, y=frame.y, z=frame.z)
         for key in ("centre_of_gravity", "centre_of_buoyancy", "sail_top"):
             data["particulars"][key]["value"] = turn(data["particulars"][key]["value"])
+        if data["tanks"]:
+            tank = data["tanks"]["ballast"]["position"]
+            tank["value"] = turn(tank["value"])
         for plane in data["planes"]:
             for key in ("position", "span_axis", "leading_edge"):
                 plane[key] = turn(plane[key])

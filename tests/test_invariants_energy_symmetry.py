@@ -199,3 +199,18 @@ def test_a_zigzag_flown_to_the_other_side_is_its_mirror_image(without_torque):
     assert np.abs(starboard.record[:, first : first + 5] - image).max() < 1e-9
     assert len(port.executes) == len(starboard.executes) >= 2
     assert starboard.executes == pytest.approx(port.executes * [1.0, -1.0], abs=1e-8)
+
+
+@pytest.mark.parametrize("name", ["turn20-23.69m", "turning-circle"])
+def test_a_turn_to_port_is_the_mirror_image_of_one_to_starboard(without_torque, name):
+    """With ballast and without it, and with the event that ends the turn."""
+    case = load_case(name)[0].model_copy(deep=True)
+    case.run.duration_s = 120.0
+    starboard = simulate(case, without_torque)
+    case.command.dH.value_deg = -case.command.dH.value_deg
+    port = simulate(case, without_torque)
+    size = np.array([1, 1, 1, 1, 1, 1, 70.0, 70.0, 70.0, 1, 1, 1])
+    assert np.abs((port.record[:, 1:13] - MIRROR * starboard.record[:, 1:13]) / size).max() < 1e-9
+    assert np.ptp(starboard["psi"]) > 1.0
+    if "ballast" in starboard.columns:
+        assert port["ballast"] == pytest.approx(starboard["ballast"], abs=1e-6)

@@ -1,0 +1,172 @@
+"""A user's own reference file, path length as abscissa, and records with their own start."""
+
+from __future__ import annotations
+
+import json
+from importlib.resources import files
+
+import numpy as np
+import pandas as pd
+import pytest
+from click.testing import CliRunner
+
+from ident.bands import fly_samples, inside
+from ident.cli import main
+from ident.validate import validate
+from sim.case import load_case, load_reference
+from sim.coefficients import Coefficients
+from sim.errors import InputError
+from sim.simulate import simulate
+
+DATA = files("sim") / "cases" / "data"
+
+
+def _own(path, name="turn20_23.69m.csv", turn=None):
+    table = pd.read_csv(DATA / name)
+    if turn is not None:
+        table = turn(table)
+    table.to_csv(path, index=False)
+    return path
+
+
+def test_bundled_file_given_as_own_gives_the_bundled_errors(tmp_path, fitted_db):
+    bundled = validate("turn20-23.69m", fitted_db).result
+    own = validate("turn20-23.69m", fitted_db, reference_file=_own(tmp_path / "mine.csv")).result
+    assert own["references"] == bundled["references"]
+    assert own["metrics"] == bundled["metrics"]
+    assert own["references"]["CFD"]["x"]["ratio"] > 0.0
+
+
+def test_frame_option_turns_the_file(tmp_path, fitted_db):
+    """The same track written x forward, z down, with --frame program; x changes sign only."""
+
+    def turn(table):
+        return table.assign(value=table["value"].where(table["channel"] != "x", -table["value"]))
+
+    path = _own(tmp_path / "mine.csv", turn=turn)
+    bundled = validate("turn20-23.69m", fitted_db).result["references"]
+    assert (
+        validate("turn20-23.69m", fitted_db, reference_file=path, reference_frame="program").result["references"]
+        == bundled
+    )
+    wrong = validate("turn20-23.69m", fitted_db, reference_file=path, reference_frame="source").result["references"]
+    assert wrong["CFD"]["x"]["rmse"] > bundled["CFD"]["x"]["rmse"]
+
+
+def test_every_channel_of_the_simulation_is_compared(tmp_path, fitted_db):
+    """A case without a bundled reference: two sources, a channel nobody has, no sigma."""
+    t = np.arange(0.0, 60.0, 1.0)
+    rows = [("TANK", c, x, 0.01 * x, u) for c, u in (("theta", "deg"), ("q", "rad/s"), ("mood", "-")) for x in t]
+    rows += [("HDM", "theta", x, 0.02 * x, "deg") for x in t]
+    path = tmp_path / "mine.csv"
+    pd.DataFrame(rows, columns=["source", "channel", "t", "value", "unit"]).to_csv(path, index=False)
+    assert validate("vzz10-15kt", fitted_db).result["references"] == {}
+    found = validate("vzz10-15kt", fitted_db, reference_file=path).result["references"]
+    assert set(found) == {"TANK"}
+    assert set(found["TANK"]) == {"theta", "q"}
+    # 0.01 t against 0.02 t: root mean square of 0.01 t.
+    assert found["TANK"]["theta"]["published_model_rmse"] == pytest.approx(0.01 * np.sqrt(np.mean(t**2)))
+    assert found["TANK"]["q"]["ratio"] is None
+    assert found["TANK"]["theta"]["reference_sigma"] is None
+
+
+def test_command_line_takes_an_own_reference(tmp_path, fitted_db):
+    path = _own(tmp_path / "mine.csv")
+    common = ["validate", "--case", "turn20-4m", "--db", fitted_db, "--out", str(tmp_path / "out"), "--json", "-"]
+    done = CliRunner().invoke(main, [*common, "--reference", str(path)])
+    assert done.exit_code == 0, done.output
+    found = json.loads(done.stdout[done.stdout.index("{") :])
+    assert found["references"]["CFD"]["y"]["ratio"] > 0.0
+    assert (tmp_path / "out" / "turn20-4m_v0.png").stat().st_size > 10000
+    assert CliRunner().invoke(main, [*common, "--frame", "program"]).exit_code == 2
+    assert CliRunner().invoke(main, ["validate", "--all", "--vehicle", "bb2", "--db", fitted_db]).exit_code == 2
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("source,channel,t,value\nA,x,0,1\n", ["column unit"]),
+        ("source,channel,t,value,unit\nA,mood,0,1,m\n", ["column channel", "mood"]),
+        ("source,channel,t,value,unit\nA,x,0,1,m\nA,x,0,2,m\n", ["not increasing"]),
+        ("source,channel,t,value,unit\nA,x,0,1,m\nA,x,1,2,ft\n", ["units", "ft"]),
+        ("source,channel,t,value,unit\nA,x,0,1,ft\n", ["ft", "m"]),
+        ("source,channel,t,value,unit\nA,x,0,one,m\n", ["row 2", "value", "one"]),
+        ("source,channel,t,value,unit,sigma\nA,x,0,1,m,?\n", ["row 2", "sigma"]),
+        ("source,channel,t,value,unit\nA,x,900,1,m\n", ["begins", "900"]),
+        ("", ["not a table"]),
+    ],
+)
+def test_mistake_in_an_own_reference_is_named(tmp_path, fitted_db, text, words):
+    path = tmp_path / "mine.csv"
+    path.write_text(text)
+    with pytest.raises(InputError) as caught:
+        validate("vzz10-15kt", fitted_db, reference_file=path)
+    for word in words:
+        assert word in str(caught.value)
+
+
+def test_missing_own_reference_is_named(tmp_path, fitted_db):
+    with pytest.raises(InputError, match="no such file"):
+        validate("vzz10-15kt", fitted_db, reference_file=tmp_path / "none.csv")
+
+
+def test_track_is_compared_at_equal_path_length(coefficients):
+    """A reference made of the flight itself, over its path length, has no error."""
+    from ident.validate import rmse
+
+    case, _ = load_case("turn20-23.69m")
+    flown = simulate(case, coefficients)
+    along = np.linspace(0.0, flown["s"][-1], 300)
+    for channel in ("x", "y"):
+        series = (along, np.interp(along, flown["s"], flown[channel]), "m")
+        assert rmse(flown, channel, series, "s") < 1e-9
+        assert rmse(flown, channel, series, "t") > 1.0
+    speed = np.hypot(np.gradient(flown["x"], flown["t"]), np.gradient(flown["y"], flown["t"]))
+    assert flown["s"][-1] == pytest.approx(np.trapezoid(speed, flown["t"]), rel=1e-5)
+
+
+def test_reading_error_is_reported_and_not_taken_off(fitted_db):
+    """Root mean square of the sigma column, beside the same RMSE as without it."""
+    found = validate("turn20-23.69m", fitted_db).result["references"]["CFD"]["x"]
+    table = pd.read_csv(DATA / "turn20_23.69m.csv")
+    sigma = table[(table["source"] == "CFD") & (table["channel"] == "x")]["sigma"]
+    assert found["reference_sigma"] == pytest.approx(np.sqrt(np.mean(sigma**2)))
+
+
+def test_source_with_its_own_start_is_held_against_a_flight_from_there(fitted_db, coefficients):
+    """hzz20: EXP starts at 4.93 m/s, CFD at 5.14; each its own flight, the metrics of both."""
+    case, where = load_case("hzz20")
+    done = validate("hzz20", fitted_db)
+    own = case.started_as("EXP")
+    assert own.initial.speed_mps == 4.93
+    assert case.started_as("CFD") is None
+    flights = {"EXP": simulate(own, coefficients), "CFD": simulate(case, coefficients)}
+    assert flights["EXP"]["U"][0] == pytest.approx(4.93)
+    reference = load_reference(case, where)
+    for source, flight in flights.items():
+        t, u, _ = reference[source]["u"]
+        expected = np.sqrt(np.mean((np.interp(t, flight["t"], flight["u"]) - u) ** 2))
+        assert done.result["references"][source]["u"]["rmse"] == pytest.approx(expected, rel=1e-9)
+    assert done.result["metrics"]["execute_2_s"]["simulated_as_EXP"] == pytest.approx(flights["EXP"].executes[1, 0])
+
+
+def test_bands_of_a_source_with_its_own_start_start_there(campaign, rows):
+    """Without any error every band is the flight: u starts at 4.93 m/s for EXP, 5.14 for CFD."""
+    case, where = load_case("hzz20")
+    case = case.model_copy(deep=True)
+    case.run.duration_s = 5.0
+    exact = rows.assign(stderr=0.0)
+    bands = fly_samples(case, campaign.vehicle, exact, 2)
+    own = simulate(case.started_as("EXP"), Coefficients(campaign.vehicle, rows))
+    assert bands.band("u", "95", "EXP")[0] == pytest.approx(own["u"], rel=1e-9)
+    assert bands.band("U", "95", "CFD")[0][0] == pytest.approx(5.14444)
+    reference = load_reference(case, where)
+    reference.data["EXP"] = {"u": (own["t"], own["u"] + 1.0, "m/s")}
+    assert inside(bands, case, reference)["EXP"]["u"] == {"50": 0.0, "95": 0.0}
+
+
+def test_other_vehicle_by_option(fitted_db):
+    """The standard maneuvers name bb2, and fly any vehicle of the database."""
+    assert validate("meander", fitted_db, vehicle_name="bb2").result["vehicle"] == "bb2"
+    with pytest.raises(InputError, match="no such file or bundled name"):
+        validate("meander", fitted_db, vehicle_name="bb3")
