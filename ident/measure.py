@@ -18,7 +18,7 @@ Channels = dict[str, Array]
 Metrics = dict[str, float | None]
 Columns = dict[str, dict[str, float | None]]
 _DERIVED = ("U", "D0", "s")
-_HORIZONTAL, _RUN = 1, 3
+_HORIZONTAL = 1
 
 
 def channels_of(simulation: Simulation) -> Channels:
@@ -46,21 +46,15 @@ def reference_channels(reference: Series, source: str) -> Channels:
 
 
 def _step_ends(case: Case, simulation: Simulation, key: str) -> list[tuple[float, float]]:
-    """Value [rad] or [rad/s] and end [s] of each step of dH, the last with the end of the run."""
+    """Value [rad] or [rad/s] and end [s] of each step of dH that came to its end."""
     times = [float(t) for t, axis, _ in simulation.steps if int(axis) == _HORIZONTAL]
     values = [math.radians(getattr(s, key) or 0.0) for s in case.command.dH.step]
-    if len(times) < len(values):
-        times.append(float(simulation["t"][-1]))
     return list(zip(values, times, strict=False))
 
 
 def _first_step_end(simulation: Simulation, axis: int) -> float | None:
     times = [float(t) for t, number, _ in simulation.steps if int(number) == axis]
     return times[0] if times else None
-
-
-def _stopped(simulation: Simulation) -> bool:
-    return any(int(axis) == _RUN for _, axis, _ in simulation.steps)
 
 
 def _surfaced(case: Case, simulation: Simulation) -> bool:
@@ -87,7 +81,7 @@ def _flown_only(case: Case, simulation: Simulation) -> tuple[Metrics, list[dict[
     if kind == "pull_out":
         return turning.pull_out(channels, _step_ends(case, simulation, "value_deg")), None
     if kind == "stopping":
-        return turning.stopping(channels, _stopped(simulation)), None
+        return turning.stopping(channels, bool(channels["u"][-1] <= 1e-6)), None
     if kind == "meander":
         pitch = float(simulation.trim.state[10]) if simulation.trim else float(channels["theta"][0])
         return vertical.meander(channels, _first_step_end(simulation, 0), pitch), None

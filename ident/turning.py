@@ -150,11 +150,14 @@ def direct_spiral(channels: Channels, ends: list[tuple[float, float]]) -> tuple[
         branch has none.
     curve : The points.
     """
+    if not ends:
+        return dict.fromkeys(("loop_height_degps", "loop_width_deg")), []
     points = [(float(np.degrees(dh)), float(np.degrees(_before(channels, "r", end, 5.0)))) for dh, end in ends]
     down, up = _branches(points)
     found: Metrics = {}
     for name, branch in (("down", down), ("up", up)):
-        found |= {f"yaw_rate_{dh:+g}_deg_{name}_degps": float(r) for dh, r in branch}
+        if len(branch) > 1:
+            found |= {f"yaw_rate_{dh:+g}_deg_{name}_degps": float(r) for dh, r in branch}
     heights = [float(np.interp(0.0, b[:, 0], b[:, 1])) if b[0, 0] <= 0.0 <= b[-1, 0] else None for b in (down, up)]
     zeros = [_zero(b[:, 0], b[:, 1]) for b in (down, up)]
     found["loop_height_degps"] = _gap(heights)
@@ -191,6 +194,8 @@ def reverse_spiral(channels: Channels, ends: list[tuple[float, float]]) -> tuple
         zero when it never falls.
     curve : The points.
     """
+    if len(ends) < 2:
+        return dict.fromkeys(("slope_at_zero_deg_per_degps", "loop_width_deg")), []
     points = [(float(np.degrees(r)), float(np.degrees(_before(channels, "dH", end, 30.0)))) for r, end in ends]
     rate, rudder = np.array(sorted(points)).T
     found: Metrics = {f"rudder_{r:+g}_degps_deg": d for r, d in sorted(points)}
@@ -236,7 +241,7 @@ def stopping(channels: Channels, stopped: bool) -> Metrics:
     Parameters
     ----------
     channels : ``t x y psi s``, up to the end of the run.
-    stopped : Whether the run ended because the boat lay still.
+    stopped : Whether the boat lay still at the end.
 
     Returns
     -------

@@ -310,6 +310,8 @@ def show(done: Validation, console: Console) -> None:
     end = float(done.simulation["t"][-1])
     if not _complete(done.simulation):
         console.print(f"[red]the simulation left the finite numbers after {end:.1f} s; errors are up to there[/]")
+    elif end < done.case.run.duration_s - done.case.run.record_s:
+        console.print(f"the run ended at {done.result['ends_s']:.1f} s by an event of the case", highlight=False)
     if float(done.simulation["D0"].min()) < 0.0:
         console.print("[red]the sail top left the water; the model holds for a fully submerged boat only[/]")
     verdict = "[green]within[/]" if result["passed"] else "[red]outside[/]"

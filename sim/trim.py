@@ -62,8 +62,8 @@ def _solve(
     size = {"pitch": 1.0, "dV": 1.0, "ballast": 0.01 * model.mass, "trim_tank": 1.0}
 
     def build(x: Array) -> tuple[Array, Array, dict[str, float]]:
-        n, heel, drift, dh = x[:4]
-        level = values | {k: float(size[k] * v) for k, v in zip(free, x[4:], strict=True)}
+        n, first, second, heel, drift, dh = x
+        level = values | {k: float(size[k] * v) for k, v in zip(free, (first, second), strict=True)}
         pitch = level["pitch"]
         u = speed * np.cos(drift) * np.cos(pitch)
         v = speed * np.sin(drift)
@@ -94,7 +94,7 @@ def _solve(
     # The path is straight: heading such that the course is along earth x.
     kernel.rhs(model, state, controls, work, derivative)
     state[11] = -np.arctan2(derivative[7], derivative[6])
-    return Trim(state, controls, level["dV"], float(found.x[3]), left), wrong
+    return Trim(state, controls, level["dV"], float(found.x[5]), left), wrong
 
 
 def self_propulsion(
