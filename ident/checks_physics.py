@@ -50,10 +50,9 @@ def prime_sizes(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
             value = abs(value)
             if not value > 0.0 or low <= value <= high:
                 continue
-            middle = math.sqrt(low * high)
-            power = round(math.log10(value / middle))
-            off = f"about {10.0**power:g} times" if power else "outside"
-            what = f"{size['quantity']} is {value:.3g}, {off} the range of boats and ships, {low:g} to {high:g}"
+            powers = [10.0**p for p in range(-4, 5) if p and low <= value / 10.0**p <= high]
+            off = f"; {' or '.join(f'{p:g}' for p in powers)} times too large would be in it" if powers else ""
+            what = f"{size['quantity']} is {value:.3g}, boats and ships have {low:g} to {high:g}{off}"
             yield rule.finding(str(file), [], [output], what)
 
 

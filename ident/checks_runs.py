@@ -67,7 +67,7 @@ def pairs(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
         worst = int(group.index[k])
         names = f"{runs['run_id'].iloc[first[worst]]} and {runs['run_id'].iloc[second[worst]]}"
         what = f"{parts}: {group['many'].sum()} loads disagree with their mirror image, most {OUTPUTS[column]} of "
-        what += f"{names}, by {100 * inside.max():.0f} % of the larger"
+        what += f"{names}, by {100 * inside.max():.0f} % of the largest {OUTPUTS[column]} there"
         members = runs.iloc[np.unique([first[group.index], second[group.index]])]
         columns = [OUTPUTS[c] for c in np.flatnonzero(bad[group.index].sum(axis=0))]
         severity = "info" if trusted_less else rule.severity
@@ -77,13 +77,15 @@ def pairs(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
 def _disagreement(
     evidence: Evidence, runs: pd.DataFrame, image: pd.DataFrame, first: NDArray[np.int64], second: NDArray[np.int64]
 ) -> tuple[Array, Array]:
-    """(pairs, 6) difference of loads from their image: in standard errors before quality, and relative."""
+    """(pairs, 6) difference of loads from their image: in standard errors before quality; over the largest there."""
     given = np.column_stack([kept(runs, o) for o in OUTPUTS])
     seen, own = (t[list(OUTPUTS)].to_numpy(float) for t in (image, runs))
     sigma = runs[[f"s_{o}" for o in OUTPUTS]].to_numpy(float) / factors(evidence, runs).to_numpy()[:, None]
     both = given[first] & given[second]
     off = np.where(both, np.abs(own[second] - seen[first]), 0.0)
-    size = np.where(both, np.maximum(np.abs(own[second]), np.abs(seen[first])), 1.0)
+    scale = dynamic(runs, evidence.body).fillna(1.0) if evidence.body else pd.Series(1.0, index=runs.index)
+    largest = (runs[list(OUTPUTS)].abs().div(scale, axis=0)).groupby([runs["file"], runs["test"]]).transform("max")
+    size = np.where(both, largest.to_numpy()[second] * scale.to_numpy()[second, None], 1.0)
     spread = np.nan_to_num(np.hypot(sigma[first], sigma[second]))
     score = np.where(off > 0.0, off / np.where(spread > 0.0, spread, np.nan), 0.0)
     return np.where(np.isnan(score), np.inf, score), off / np.where(size > 0.0, size, 1.0)
@@ -110,7 +112,7 @@ def zero_by_symmetry(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
         for (file, _), group in runs[bad].groupby(["file", "test"], sort=False):
             share = (load / reference)[group.index]
             worst = int(np.argmax(share.to_numpy()))
-            what = f"{output} = {group[output].iloc[worst]:.4g} in the symmetric state of run {group['run_id'].iloc[worst]}"
+            what = f"{output} = {group[output].iloc[worst]:.4g} in a symmetric state, run {group['run_id'].iloc[worst]}"
             size = f"{100 * share.iloc[worst]:.0f} % of the largest {output} there"
             known = bool(declared(evidence, group).all())
             yield rule.finding(str(file), group["row"], [output], f"{what}, {size}", milder(rule, known))
@@ -229,7 +231,8 @@ def deviations(evidence: Evidence, every: list[Series]) -> pd.DataFrame:
     table["usual"] = table["load"].groupby(here).transform("median").where(alike, 0.0)
     table["off"] = raw - raw.groupby(here).transform("median").where(alike, 0.0)
     robust = _MAD * table["off"].abs().groupby(kind).transform("median")
-    table["scale"] = np.maximum(robust, _own_error(evidence, table))
+    floor = rules()["outliers"].limits["floor"] * table["load"].abs().groupby(kind).transform("max")
+    table["scale"] = np.maximum(np.maximum(robust, floor), _own_error(evidence, table))
     return table
 
 
@@ -258,7 +261,7 @@ def _culprit(group: pd.DataFrame, series: Series) -> int:
         weight, noise = series.local_fits(given)
         judged = np.isfinite(noise)
         if judged.sum() < 3:
-            return int(group["off"].abs().idxmax())
+            return int(group.index.to_numpy()[np.argmax(group["off"].abs().to_numpy())])
         off = (values - weight @ np.where(given, values, 0.0))[judged] / noise[judged]
         left[int(row)] = float(np.abs(off).sum() / judged.sum())
     return int(min(left, key=lambda row: left[row]))
@@ -302,7 +305,7 @@ def slipped_points(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
     if evidence.body is None:
         return
     found = flagged(evidence, rule.limits["deviation"])
-    found["decade"] = [_decade(row, rule.limits["decades"]) for _, row in found.iterrows()]
+    found["decade"] = np.array([_decade(row, rule.limits["decades"]) for _, row in found.iterrows()], dtype=int)
     for _, group in found[found["decade"] != 0].groupby(["owner", "decade"], sort=False):
         worst = group.iloc[0]
         run, decade = evidence.runs.loc[worst["owner"]], int(worst["decade"])
@@ -320,7 +323,7 @@ def out_of_line(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
         return
     near = rules()["factor"].limits["decades"]
     found = flagged(evidence, rule.limits["deviation"])
-    found = found[[_decade(row, near) == 0 for _, row in found.iterrows()]]
+    found = found[np.array([_decade(row, near) == 0 for _, row in found.iterrows()], dtype=bool)]
     runs = evidence.runs.loc[found["owner"]]
     found = found.assign(file=runs["file"].to_numpy(), known=declared(evidence, runs).to_numpy())
     for (file, known), group in found.groupby(["file", "known"], sort=False):

@@ -113,7 +113,7 @@ def check(folder: Path, json_path: str | None, strict: bool) -> None:
     from ident.checks import check_campaign, show
 
     console = _console(quiet=json_path == "-")
-    found = []
+    found: list[dict[str, Any]] = []
     for path in find_campaigns(folder):
         with console.status(f"checking {path}"):
             campaign = read_campaign(path)

@@ -218,7 +218,7 @@ def prime(runs: pd.DataFrame, output: str, body: Body) -> pd.Series:
 
 def kept(runs: pd.DataFrame, output: str) -> pd.Series:
     """True where a load is given and not excluded by the campaign."""
-    return runs[output].notna() & ~runs["exclude"].map(lambda text: output in text.split())
+    return runs[output].notna() & ~runs["exclude"].map(lambda text: output in text.split()).astype(bool)
 
 
 def factors(evidence: Evidence, runs: pd.DataFrame) -> pd.Series:
