@@ -127,6 +127,39 @@ def check(folder: Path, json_path: str | None, strict: bool) -> None:
 
 
 @main.command()
+@click.argument("folder", type=click.Path(path_type=Path))
+@click.option("--target-rel", default=0.1, show_default=True, help="Standard error wanted, relative to a term's size.")
+@click.option("--facility", type=click.Path(path_type=Path), default=None, help="TOML file of levels and limits.")
+@click.option("--out", type=click.Path(path_type=Path), default=None, help="Write the test matrix as CSV.")
+@click.option("--json", "json_path", default=None, metavar="PATH|-", help="Write terms and runs as JSON.")
+def plan(folder: Path, target_rel: float, facility: Path | None, out: Path | None, json_path: str | None) -> None:
+    """Plan the fewest runs that give every term of the vehicle a wanted standard error.
+
+    \b
+    Example: ident plan raw_captive_data/bb2 --target-rel 0.1 --out plan.csv
+    """
+    from ident.campaign import find_campaigns, read_campaign
+    from ident.plan import make_plan, show, summary, write_matrix
+    from ident.plan_candidates import read_facility
+    from sim.errors import InputError
+
+    paths = find_campaigns(folder)
+    if len(paths) > 1:
+        raise InputError(str(folder), f"{len(paths)} campaigns", "one campaign folder, such as " + str(paths[0]))
+    console = _console(quiet=json_path == "-")
+    limits = read_facility(facility) if facility else None
+    campaign = read_campaign(paths[0])
+    with console.status("identifying, choosing runs, identifying again with them"):
+        made = make_plan(campaign, target_rel, limits)
+    show(made, campaign, console)
+    if out:
+        write_matrix(made, campaign, out)
+        console.print(f"test matrix: {out}", highlight=False)
+    if json_path:
+        _emit(summary(made, campaign), json_path)
+
+
+@main.command()
 @click.option("--case", "case", default=None, help="Bundled case name, or path to a case file.")
 @click.option("--all", "every", is_flag=True, help="Fly every bundled case and print the scoreboard.")
 @click.option(
