@@ -139,8 +139,9 @@ def plan(folder: Path, target_rel: float, facility: Path | None, out: Path | Non
     Example: ident plan raw_captive_data/bb2 --target-rel 0.1 --out plan.csv
     """
     from ident.campaign import find_campaigns, read_campaign
-    from ident.plan import make_plan, show, summary, write_matrix
+    from ident.plan import make_plan
     from ident.plan_candidates import read_facility
+    from ident.plan_output import show, summary, write_matrix
     from sim.errors import InputError
 
     paths = find_campaigns(folder)

@@ -20,6 +20,8 @@ Counts = NDArray[np.int64]
 _LEAST_GAIN = 1e-9
 # Squared row over variance below this tells nothing of an unknown.
 _HELPS = 1e-6
+# A run that carried all but this part of some precision is taken away without an update.
+_NEARLY = 1e-6
 
 
 class Design:
@@ -61,10 +63,13 @@ class Design:
         """Add (+1) or take away (-1) one repeat of a candidate, updating the covariance."""
         rows, seen = self.rows[i], self.seen[i]
         inner = np.eye(rows.shape[0]) + by * seen @ rows.T
+        self.counts[i] += by
+        if by < 0 and np.linalg.eigvalsh(inner)[0] < _NEARLY:
+            self.refresh()
+            return
         step = by * np.linalg.solve(inner, seen)
         self.covariance = self.covariance - seen.T @ step
-        self.seen = self.seen - np.einsum("nkp,lp->nkl", self.seen, rows) @ step
-        self.counts[i] += by
+        self.seen = self.seen - (self.seen @ rows.T) @ step
 
 
 def d_optimal(candidates: Sequence[Array], runs: int, precision: Array, most: int | None = None) -> Counts:

@@ -11,13 +11,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from ident.campaign import Campaign, _to_full_scale, _turn
+from ident.campaign import Campaign
 from ident.design import Array, fewest_runs
 from ident.findings import STATE, Body, dynamic, run_table
 from ident.identify import Identification, Solver, identify
@@ -26,12 +25,7 @@ from sim.catalogue import OUTPUTS, Term
 from sim.errors import InputError
 from sim.parts import Point, parts_of, vehicle_terms
 
-if TYPE_CHECKING:
-    from rich.console import Console
-
 Place = tuple[str, str, Point]
-_ANGLES = ("alpha", "beta", "plane")
-_UNITS = {"U": "mps", "D0": "m", "p": "radps", "q": "radps", "r": "radps", "n": "rps", "J": ""}
 
 
 @dataclass
@@ -101,6 +95,22 @@ def _worst(values: Any) -> float | None:
     return max(known) if known else None
 
 
+@dataclass
+class Block:
+    """Equations of one candidate run.
+
+    Attributes
+    ----------
+    rows : Column -> factor over the standard error, one a load.
+    measured : Wanted terms that the run measures.
+    sigma : Standard error of each load with an unknown in it [N, N m].
+    """
+
+    rows: list[dict[int, float]] = field(default_factory=list)
+    measured: dict[str, None] = field(default_factory=dict)
+    sigma: dict[str, float] = field(default_factory=dict)
+
+
 class _Problem:
     """Unknowns and equations of the candidate runs of a campaign."""
 
@@ -112,6 +122,7 @@ class _Problem:
         self.solver = solver
         self.stderr = {k: math.sqrt(found.covariance[i, i]) for k, i in solver.index.items()}
         self.sizes = self._sizes()
+        self._known_sizes: dict[tuple[str, str], float] = {}
         self.columns: dict[Place, int] = {}
         self.needs: dict[Place, Need] = {}
         self.noise = _Noise(campaign)
@@ -124,6 +135,12 @@ class _Problem:
         return {k: math.sqrt(float(np.mean(np.square(v)))) for k, v in groups.items() if any(v)}
 
     def size(self, term: Term, part: str) -> float:
+        """``_size``, looked up."""
+        if (term.name, part) not in self._known_sizes:
+            self._known_sizes[term.name, part] = self._size(term, part)
+        return self._known_sizes[term.name, part]
+
+    def _size(self, term: Term, part: str) -> float:
         """Root mean square of a term's values, or the median of its kind; at least a part of that."""
         kind = (term.group, term.output in "XYZ")
         like = [s for (n, _), s in self.sizes.items() if self._kind(n) == kind]
@@ -160,9 +177,9 @@ class _Problem:
                 return f"{axis} beyond the runs"
         return ""
 
-    def block(self, run: pd.Series) -> list[dict[int, float]]:
-        """Equations of a candidate, over their standard errors; unknowns entered as they come."""
-        solver, rows = self.solver, []
+    def block(self, run: pd.Series) -> Block:
+        """Equations of a candidate; unknowns are entered as they come."""
+        solver, found = self.solver, Block()
         features = solver.features(run)
         for output in OUTPUTS:
             row: dict[int, float] = {}
@@ -184,10 +201,13 @@ class _Problem:
                     size = self.size(key, place[1])
                     now = self.stderr.get(place, math.nan) / size
                     self.needs[place] = Need(*place, why, size, term.tests, now)
+                if why:
+                    found.measured[place[0]] = None
             if expected:
                 sigma = self.noise.of(run, output, expected)
-                rows.append({c: v / sigma for c, v in row.items()})
-        return rows
+                found.rows.append({c: v / sigma for c, v in row.items()})
+                found.sigma[output] = sigma
+        return found
 
     def _subtracted(self, row: dict[int, float], term: Term, part: str, m: float, features: dict[str, float]) -> None:
         """Values that ``identify`` would subtract: their error limits what a run can tell."""
@@ -229,8 +249,9 @@ class _Noise:
         relative = self.relative.get(run["test"], math.nan)
         relative = defaults()["relative_error"][0] if math.isnan(relative) else relative
         level = self.prime.get((run["test"], run["part"], output), 0.0)
-        pressure = float(dynamic(pd.DataFrame([run]), self.body).iloc[0])
-        floor = 0.0 if math.isnan(pressure) else level * pressure * (self.length if output in "KMN" else 1.0)
+        turned = sum(float(run[k]) ** 2 for k in ("p", "q", "r") if run[k] == run[k]) * self.length**2
+        pressure = 0.5 * self.body.density * self.length**2 * (float(run["U"]) ** 2 + turned)
+        floor = level * pressure * (self.length if output in "KMN" else 1.0)
         return max(floor, relative * expected)
 
 
@@ -258,17 +279,19 @@ def make_plan(campaign: Campaign, target: float, facility: Facility | None = Non
     keep = []
     for i, block in enumerate(blocks):
         # A run and its mirror image tell the same; the first of the two is kept.
-        shape = tuple(sorted((c, float(f"{abs(v):.6g}")) for row in block for c, v in row.items()))
-        if shape and shape not in seen and _serves(problem, block, candidates["test"].iloc[i]):
+        shape = tuple(sorted((c, float(f"{abs(v):.6g}")) for row in block.rows for c, v in row.items()))
+        if block.measured and shape not in seen:
             seen.add(shape)
             keep.append(i)
-    counts = _design(problem, [blocks[i] for i in keep], facility.repeats) if keep else np.zeros(0, dtype=int)
-    runs = candidates.iloc[[i for i, n in zip(keep, counts, strict=True) if n]].copy()
-    runs["repeats"] = [int(n) for n in counts if n]
-    served = [_serves(problem, blocks[i], candidates["test"].iloc[i]) for i in keep]
-    runs["identifies"] = [s for s, n in zip(served, counts, strict=True) if n]
-    runs = runs.reset_index(drop=True)
-    plan = Plan(target, list(problem.needs.values()), runs.assign(**_sigmas(problem, runs)), _untestable(problem))
+    counts = _design(problem, [blocks[i].rows for i in keep], facility.repeats) if keep else np.zeros(0, dtype=int)
+    chosen = [(i, int(n)) for i, n in zip(keep, counts, strict=True) if n]
+    runs = candidates.iloc[[i for i, _ in chosen]].reset_index(drop=True)
+    runs["repeats"] = [n for _, n in chosen]
+    runs["identifies"] = [" ".join(blocks[i].measured) for i, _ in chosen]
+    for output in OUTPUTS:
+        # A load without an unknown has no bearing; its error must only not be zero.
+        runs[f"s_{output}"] = [blocks[i].sigma.get(output, 1.0) / math.sqrt(n) for i, n in chosen]
+    plan = Plan(target, list(problem.needs.values()), runs, _untestable(problem))
     _predict(problem, plan)
     return plan
 
@@ -289,13 +312,6 @@ def _design(problem: _Problem, blocks: list[list[dict[int, float]]], most: int) 
         if problem.columns[place] in at:
             target[at[problem.columns[place]]] = problem.target * need.size
     return fewest_runs(dense, problem.precision()[np.ix_(used, used)], target, most, defaults()["patience"][0])
-
-
-def _serves(problem: _Problem, block: list[dict[int, float]], test: str) -> str:
-    """Names of the wanted terms that a run measures."""
-    columns = {c for row in block for c in row}
-    names = [n.name for p, n in problem.needs.items() if problem.columns[p] in columns and test in n.tests]
-    return " ".join(dict.fromkeys(names))
 
 
 def _untestable(problem: _Problem) -> dict[str, tuple[str, ...]]:
@@ -338,88 +354,3 @@ def _predict(problem: _Problem, plan: Plan) -> None:
         if place in index:
             i = index[place]
             need.planned = math.sqrt(after.covariance[i, i]) / need.size
-
-
-def _sigmas(problem: _Problem, runs: pd.DataFrame) -> pd.DataFrame:
-    """Standard error of every planned load, repeats averaged; never zero."""
-    solver = problem.solver
-    found = pd.DataFrame(0.0, index=runs.index, columns=[f"s_{o}" for o in OUTPUTS])
-    for i, run in runs.iterrows():
-        features = solver.features(run)
-        for output in OUTPUTS:
-            terms = [(t, m) for t, m in solver.active(run, output, features) if run["test"] in t.tests]
-            expected = sum(abs(solver.scales[t.name] * m) * problem.size(t, run["part"]) for t, m in terms)
-            found.loc[i, f"s_{output}"] = problem.noise.of(run, output, expected) / math.sqrt(run["repeats"])
-    return found.where(found > 0.0, 1.0)
-
-
-# -- output ------------------------------------------------------------------------------
-
-
-def matrix(plan: Plan, campaign: Campaign) -> pd.DataFrame:
-    """The test matrix in the campaign's frame and scale, units in the header."""
-    frame = campaign.header.frame.frame
-    table = _to_full_scale(_turn(plan.runs, frame), 1.0 / campaign.header.scale.ratio)
-    out = pd.DataFrame(
-        {"run_id": [f"P{i + 1:03d}" for i in range(len(table))], "test": table["test"], "part": table["part"]}
-    )
-    for name in STATE:
-        if table[name].notna().any():
-            unit = "deg" if name in _ANGLES else _UNITS.get(name, "radps2" if name[0] in "pqr" else "mps2")
-            values = np.rad2deg(table[name]) if name in _ANGLES else table[name]
-            # Twelve digits, as in the tables: runs that share a product of speed and rate share a value.
-            out[f"{name}_{unit}"] = [float(f"{v:.14g}") + 0.0 if math.isfinite(v) else math.nan for v in values]
-    return out.assign(repeats=table["repeats"], identifies=table["identifies"])
-
-
-def summary(plan: Plan, campaign: Campaign) -> dict[str, Any]:
-    """Terms, runs and what is out of reach, for a program to read."""
-    table = matrix(plan, campaign)
-    runs = [{k: v for k, v in row.items() if v == v} for row in table.to_dict("records")]
-    return {
-        "campaign": campaign.header.name,
-        "target": plan.target,
-        "terms": plan.summary(),
-        "runs": runs,
-        "no_test_planned": {name: list(tests) for name, tests in plan.untestable.items()},
-    }
-
-
-def write_matrix(plan: Plan, campaign: Campaign, path: Path) -> None:
-    """Write the test matrix as CSV.
-
-    Raises
-    ------
-    InputError
-        When the file cannot be written.
-    """
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        matrix(plan, campaign).to_csv(path, index=False)
-    except OSError as error:
-        raise InputError(str(path), f"cannot be written: {error.strerror}", "a path you may write to") from error
-
-
-def show(plan: Plan, campaign: Campaign, console: Console) -> None:
-    """Print what is wanted, what the plan reaches, and the number of runs by test."""
-    from rich.markup import escape
-    from rich.table import Table
-
-    title = f"{campaign.vehicle.title}: values wanted at a relative standard error of {plan.target:g}"
-    table = Table(title=escape(title), title_justify="left")
-    for name in ("coefficient", "part", "why", "values", "now", "planned", "tests"):
-        table.add_column(name, justify="right" if name in ("values", "now", "planned") else "left")
-    for row in plan.summary():
-        now, planned = ("-" if row[k] is None else f"{100 * row[k]:.3g} %" for k in ("now", "planned"))
-        colour = "green" if row["reached"] else "red"
-        cells = [row["coefficient"], row["part"], row["why"], str(row["values"]), now]
-        table.add_row(*(escape(c) for c in cells), f"[{colour}]{planned}[/]", escape(" ".join(row["tests"])))
-    console.print(table)
-    for name, tests in plan.untestable.items():
-        console.print(
-            f"  {escape(name)}: no run, and none planned; {escape(' or '.join(tests))} gives it", highlight=False
-        )
-    for (test, part), group in plan.runs.groupby(["test", "part"], sort=False):
-        console.print(f"  {test}, {part}: {len(group)} states, {group['repeats'].sum()} runs", highlight=False)
-    total = int(plan.runs["repeats"].sum()) if len(plan.runs) else 0
-    console.print(f"[bold]{len(plan.runs)} states, {total} runs[/]", highlight=False)

@@ -101,7 +101,7 @@ def campaign_levels(campaign: Campaign) -> dict[str, Levels]:
     towed = runs[(runs["U"] > 0.0) & along & (runs["part"] == "hull")]
     speed = float(towed["U"].max()) if len(towed) else 1.0
     rate = _largest_rate(towed, length) or defaults()["rate"][0]
-    own = {test: group for test, group in runs.groupby("test")}
+    own = dict(iter(runs.groupby("test")))
     found = {}
     for test in Facility.model_fields:
         if test in ("name", "repeats", "exclude"):
