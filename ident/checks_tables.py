@@ -14,6 +14,7 @@ import pandas as pd
 
 from ident.checks_copies import digits
 from ident.findings import DIRECT, Array, Evidence, Finding, Rule, check, rules
+from ident.nodes import vanishes
 from sim.catalogue import OUTPUTS
 from sim.parts import parts_of, vehicle_terms
 
@@ -237,7 +238,8 @@ def unsupported_terms(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
     for term in vehicle_terms(campaign.vehicle):
         keys = {(m.name, m.part) for k, m in solver.mirrors.items() if k[0] == term.name}
         keys |= {(term.name, part) for part in parts_of(term, campaign.vehicle)}
-        if term.name != "w_T" and not keys & own:
+        idle = all(vanishes(term, part, campaign.vehicle) for part in parts_of(term, campaign.vehicle))
+        if term.name != "w_T" and not idle and not keys & own:
             (copied if keys & seen else absent).setdefault(term.tests[0], []).append(term.name)
     for groups, text, severity in (
         (absent, "no run identifies", rule.severity),

@@ -20,6 +20,7 @@ from ident.campaign import Campaign
 from ident.design import Array, fewest_runs
 from ident.findings import STATE, Body, dynamic, run_table
 from ident.identify import Identification, Solver, identify
+from ident.nodes import vanishes
 from ident.plan_candidates import Facility, candidate_runs, defaults
 from sim.catalogue import OUTPUTS, Term
 from sim.errors import InputError
@@ -322,7 +323,8 @@ def _untestable(problem: _Problem) -> dict[str, tuple[str, ...]]:
     for term in vehicle_terms(vehicle):
         keys = [problem.solver.mirrors[term.name, part] for part in parts_of(term, vehicle)]
         own = {(term.name, part) for part in parts_of(term, vehicle)} | {(m.name, m.part) for m in keys}
-        if not own & reached:
+        idle = all(vanishes(term, part, vehicle) for part in parts_of(term, vehicle))
+        if not idle and not own & reached:
             found[term.name] = term.tests
     return found
 

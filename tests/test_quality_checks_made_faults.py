@@ -272,3 +272,10 @@ def test_the_report_shows_the_findings_of_the_commit(rows, bundled, tmp_path):
             assert (html.escape(finding.file) in section) == (number == 0)
         assert ("HD-23.69-10-08" in section) == (number == 0)
         assert ("Not stored" in section) == (number == 1)
+
+
+def test_the_documentation_lists_every_check():
+    text = (Path(__file__).parents[1] / "docs" / "checks.md").read_text(encoding="utf-8").replace("\\|", "|")
+    for rule in rules().values():
+        assert f"| `{rule.name}` | {rule.severity} | {rule.finds} |" in text
+        assert rule.remedy in text
