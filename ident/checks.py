@@ -7,14 +7,17 @@ derivatives, registered by name; ``data/checks.csv`` holds their limits and reme
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
 import pandas as pd
 
 from ident import checks_copies, checks_physics, checks_runs, checks_tables
 from ident.campaign import Campaign
 from ident.findings import SEVERITIES, Body, Evidence, Finding, registered, rules
+from ident.identify import Identification, identify
 from sim.errors import InputError
 
 if TYPE_CHECKING:
@@ -74,13 +77,28 @@ def run(evidence: Evidence) -> list[Finding]:
     ----------
     evidence : What there is; checks without their evidence find nothing.
     """
-    found = [f for name, group in registered().items() for function in group for f in function(evidence, rules()[name])]
+    # Numbers no boat has must not stop the check that says so.
+    with np.errstate(all="ignore"):
+        found = [f for name, own in registered().items() for check in own for f in check(evidence, rules()[name])]
     return sorted(found, key=lambda f: -SEVERITIES.index(f.severity))
 
 
 def check_campaign(campaign: Campaign, folder: Path | None = None) -> list[Finding]:
-    """Quality checks of a campaign, errors first."""
-    return run(evidence_of(campaign, folder))
+    """Quality checks of a campaign, errors first.
+
+    Constant coefficients are identified for it and checked as a table of derivatives.
+    """
+    evidence = evidence_of(campaign, folder)
+    if campaign.vehicle.term_set == "gertler_hagen":
+        evidence = replace(evidence, derivatives=constants(identify(campaign)))
+    return run(evidence)
+
+
+def constants(found: Identification) -> pd.DataFrame:
+    """The coefficients without an axis, as a table of derivatives: coefficient, value, file, row."""
+    own = [(n.name, v) for n, v in zip(found.nodes, found.values, strict=True) if not n.point and n.part == "hull"]
+    table = pd.DataFrame(own, columns=["coefficient", "value"])
+    return table.assign(file="identified coefficients", row=table.index + 1)
 
 
 def refuse_errors(folder: Path, findings: list[Finding]) -> None:

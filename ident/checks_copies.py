@@ -15,6 +15,8 @@ from sim.vehicle import Vehicle
 
 # Digits in which two copies agree after they went through a spreadsheet.
 _AGREE = 6
+# Smaller numbers have no six digits left.
+_NOTHING = 1e-290
 
 
 def digits(values: Array) -> NDArray[np.int64]:
@@ -26,7 +28,7 @@ def digits(values: Array) -> NDArray[np.int64]:
 
 def _rounded(values: Array) -> Array:
     """Numbers to six significant digits; NaN counts as zero."""
-    finite = np.nan_to_num(values)
+    finite = np.where(np.abs(np.nan_to_num(values)) > _NOTHING, np.nan_to_num(values), 0.0)
     size = np.where(finite == 0.0, 1.0, np.abs(finite))
     unit = 10.0 ** (np.floor(np.log10(size)) - (_AGREE - 1))
     return np.round(finite / unit) * unit + 0.0

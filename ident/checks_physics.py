@@ -169,6 +169,8 @@ def _apparent(evidence: Evidence) -> Iterator[tuple[str, str, pd.DataFrame, floa
             whole = group.groupby([acceleration, group["D0"].fillna(0.0)]).agg({output: "sum"}).reset_index()
             whole = whole if group["part"].nunique() > 1 else group
             x, y = whole[acceleration].to_numpy(float), whole[output].to_numpy(float)
+            if not x @ x > 0.0:
+                continue
             yield str(file), acceleration, group, -float(x @ y / (x @ x))
 
 

@@ -292,9 +292,9 @@ def flagged(evidence: Evidence, limit: float) -> pd.DataFrame:
 
 def _decade(row: pd.Series, near: float) -> int:
     """Power of ten a load is off by, 0 when it is off by something else."""
-    if row["load"] * row["expected"] <= 0.0:
+    if not np.sign(row["load"]) * np.sign(row["expected"]) > 0.0:
         return 0
-    power = math.log10(row["load"] / row["expected"])
+    power = math.log10(abs(row["load"])) - math.log10(abs(row["expected"]))
     whole = round(power)
     return whole if abs(power - whole) <= near and 1 <= abs(whole) <= 3 else 0
 

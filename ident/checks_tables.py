@@ -240,7 +240,7 @@ def unsupported_terms(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
         keys |= {(term.name, part) for part in parts_of(term, campaign.vehicle)}
         idle = all(vanishes(term, part, campaign.vehicle) for part in parts_of(term, campaign.vehicle))
         if term.name != "w_T" and not idle and not keys & own:
-            (copied if keys & seen else absent).setdefault(term.tests[0], []).append(term.name)
+            (copied if keys & seen else absent).setdefault(" or ".join(term.tests), []).append(term.name)
     for groups, text, severity in (
         (absent, "no run identifies", rule.severity),
         (copied, "only copies or mappings of other runs give", "info"),

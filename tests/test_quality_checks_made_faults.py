@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import html
 import json
+import math
 import re
 import shutil
 from dataclasses import replace
@@ -93,9 +94,14 @@ def test_what_the_campaign_calls_suspect_is_information(bundled):
 # -- faults put in -----------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("factor", [10.0, 0.1, 1000.0, 0.001])
 @pytest.mark.parametrize(
-    ("run_id", "output"), [("HD-7-06-08", "N"), ("PD-sail_planes-25-06-+20", "Z"), ("VD-4-10-+08", "M")]
+    ("run_id", "output", "factor"),
+    [
+        ("HD-7-06-08", "N", 10.0),
+        ("HD-7-06-08", "N", 0.001),
+        ("PD-sail_planes-25-06-+20", "Z", 0.1),
+        ("VD-4-10-+08", "M", 1000.0),
+    ],
 )
 def test_a_slipped_decimal_point(evidence, run_id, output, factor):
     def slip(runs):
@@ -186,6 +192,21 @@ def test_a_campaign_of_another_length(evidence):
     assert found.severity == "error"
 
 
+@settings(max_examples=15, deadline=None)
+@given(st.data())
+def test_no_number_stops_the_checks(evidence, data):
+    """Whatever a file may hold, a check says what it sees and does not fail."""
+    own = evidence.runs["file"].isin(["drift_horizontal.csv", "acceleration.csv", "open_water.csv"])
+    runs = evidence.runs[own].iloc[::4].reset_index(drop=True)
+    columns = [*OUTPUTS, "U", "beta", "D0", "vdot", "KT", "KQ", "J", "rel_sigma", "s_Y"]
+    odd = st.sampled_from([0.0, -0.0, 1e15, -1e15, 1e-300, 5e-324, math.nan, 1.0])
+    for _ in range(data.draw(st.integers(1, 12))):
+        row = data.draw(st.integers(0, len(runs) - 1))
+        runs.loc[row, data.draw(st.sampled_from(columns))] = data.draw(odd)
+    altered = replace(evidence, runs=runs, campaign=replace(evidence.campaign, runs=runs), memo={})
+    assert all(f.what and f.remedy and f.file for f in run(altered))
+
+
 @settings(max_examples=60, deadline=None)
 @given(st.lists(st.integers(1, 400), min_size=1, max_size=60))
 def test_spans_name_exactly_the_rows(rows):
@@ -237,16 +258,12 @@ def spoiled(tmp_path):
 
 
 def test_check_command_json_and_strict(spoiled):
-    plain = CliRunner().invoke(main, ["check", str(spoiled), "--json", "-"])
-    assert plain.exit_code == 0
+    plain = CliRunner().invoke(main, ["check", str(spoiled), "--json", "-", "--strict"])
+    assert plain.exit_code == 1
     findings = json.loads(plain.output)[0]["findings"]
     slip = next(f for f in findings if f["check"] == "factor")
     assert (slip["file"], slip["rows"], slip["columns"]) == ("drift_horizontal.csv", [20], ["K"])
     assert slip["remedy"]
-    assert CliRunner().invoke(main, ["check", str(spoiled), "--strict"]).exit_code == 1
-    shown = CliRunner().invoke(main, ["check", str(BB2), "--strict"])
-    assert shown.exit_code == 0
-    assert "quality checks: 0 error" in shown.output
 
 
 def test_strict_fit_commits_nothing_and_says_where(spoiled, tmp_path):
