@@ -79,6 +79,20 @@ class Facility(Data):
     acceleration: Levels | None = None
     propeller_side_force: Levels | None = None
 
+    @field_validator("exclude")
+    @classmethod
+    def _known(cls, names: list[str]) -> list[str]:
+        tests = planned_tests()
+        unknown = [n for n in names if n not in tests]
+        if unknown:
+            raise ValueError(f"{unknown[0]!r} is not one of {', '.join(tests)}")
+        return names
+
+
+def planned_tests() -> list[str]:
+    """Tests a plan may hold: the tables of a facility file."""
+    return [name for name in Facility.model_fields if name not in ("name", "repeats", "exclude")]
+
 
 def read_facility(path: Path) -> Facility:
     """A facility file.
@@ -103,9 +117,7 @@ def campaign_levels(campaign: Campaign) -> dict[str, Levels]:
     rate = _largest_rate(towed, length) or defaults()["rate"][0]
     own = dict(iter(runs.groupby("test")))
     found = {}
-    for test in Facility.model_fields:
-        if test in ("name", "repeats", "exclude"):
-            continue
+    for test in planned_tests():
         group = own.get(test, runs)
         depth = float(group["D0"].max()) if group["D0"].notna().any() else float(runs["D0"].max())
         levels = {"speed_mps": [] if test == "pure_rotation" else [speed], "depth_m": [depth]}

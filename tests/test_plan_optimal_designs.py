@@ -23,7 +23,7 @@ from ident.cli import main
 from ident.design import Design, d_optimal, fewest_runs
 from ident.identify import Solver, identify
 from ident.plan import make_plan, planned_campaign
-from ident.plan_candidates import Facility, Levels, read_facility
+from ident.plan_candidates import Facility, Levels, planned_tests, read_facility
 from ident.plan_output import matrix
 from sim.catalogue import OUTPUTS
 from sim.errors import InputError
@@ -138,7 +138,7 @@ def rotations():
 
 @pytest.fixture(scope="module")
 def only_rotation():
-    others = [t for t in Facility.model_fields if t not in ("name", "repeats", "exclude", "pure_rotation")]
+    others = [t for t in planned_tests() if t != "pure_rotation"]
     return Facility(
         exclude=others, repeats=6, pure_rotation=Levels(depth_m=[25.0], **{f"{k}_radps": [0.02] for k in "pqr"})
     )
@@ -236,11 +236,15 @@ def test_the_matrix_can_be_run_and_read_back(bb2_plan, campaign, tmp_path):
 
 
 def test_plan_command(tmp_path):
+    folder = tmp_path / "bb2"
+    folder.mkdir()
+    for name in ("campaign.toml", "towing.csv", "drift_vertical.csv", "drift_horizontal.csv"):
+        shutil.copy(BB2 / name, folder / name)
     limits = tmp_path / "arm.toml"
     levels = "[rotating_arm]\nspeed_mps = [3.0]\ndepth_m = [25]\nr_radps = [0.02]\nbeta_deg = [8]\n"
     limits.write_text('name = "arm"\nexclude = ["pure_rotation"]\nrepeats = 2\n' + levels)
     out = tmp_path / "plan.csv"
-    done = CliRunner().invoke(main, ["plan", str(BB2), "--facility", str(limits), "--out", str(out), "--json", "-"])
+    done = CliRunner().invoke(main, ["plan", str(folder), "--facility", str(limits), "--out", str(out), "--json", "-"])
     assert done.exit_code == 0, done.output
     told = json.loads(done.output)
     table = pd.read_csv(out)
@@ -260,6 +264,7 @@ def test_plan_command(tmp_path):
         ("[rotating_arm]\nr_radps = [-0.1]\n", "zero or more"),
         ("[rotating_arms]\n", "rotating_arms"),
         ("repeats = 0\n", "repeats"),
+        ('exclude = ["arm"]\n', "rotating_arm"),
         ("[rotating_arm\n", "not TOML"),
     ],
 )

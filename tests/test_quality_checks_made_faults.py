@@ -192,7 +192,7 @@ def test_a_campaign_of_another_length(evidence):
     assert found.severity == "error"
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=8, deadline=None)
 @given(st.data())
 def test_no_number_stops_the_checks(evidence, data):
     """Whatever a file may hold, a check says what it sees and does not fail."""
@@ -249,7 +249,9 @@ def test_a_body_turned_by_a_quarter(horizontal, vertical):
 @pytest.fixture
 def spoiled(tmp_path):
     folder = tmp_path / "bb2"
-    shutil.copytree(BB2, folder)
+    folder.mkdir()
+    for name in ("campaign.toml", "towing.csv", "drift_vertical.csv", "drift_horizontal.csv"):
+        shutil.copy(BB2 / name, folder / name)
     path = folder / "drift_horizontal.csv"
     text = path.read_text(encoding="utf-8")
     assert text.count(",691680,") == 1  # K of HD-7-06-08
