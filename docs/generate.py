@@ -15,6 +15,7 @@ from typing import Any
 
 from ident.derivatives import derivatives
 from ident.figures import case_figure
+from ident.findings import rules
 from ident.fit import fit
 from ident.scoreboard import run_all
 from sim import catalogue
@@ -91,6 +92,22 @@ def errata() -> str:
     return table(list(rows[0]), [list(r.values()) for r in rows])
 
 
+def check_table() -> str:
+    """Every quality check with its limits and remedy, from ``ident/data/checks.csv``."""
+    rows = [
+        [
+            f"`{r.name}`",
+            r.severity,
+            r.finds,
+            ", ".join(f"{k} {v:g}" for k, v in r.limits.items()) or "-",
+            r.basis,
+            r.remedy,
+        ]
+        for r in rules().values()
+    ]
+    return table(["check", "severity", "finds", "limits", "because", "remedy"], rows)
+
+
 def term_table() -> str:
     """Both term sets."""
     parts = []
@@ -142,6 +159,7 @@ def main() -> int:
         ROOT / "README.md": {"signs": signs(coefficients), "accuracy": accuracy(board)},
         ROOT / "docs" / "errata.md": {"errata": errata()},
         ROOT / "docs" / "terms.md": {"terms": term_table()},
+        ROOT / "docs" / "checks.md": {"checks": check_table()},
     }
     stale = [path for path, blocks in wanted.items() if replace(path, blocks) != path.read_text(encoding="utf-8")]
     if only_check:

@@ -9,6 +9,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ident.campaign import Campaign, find_campaigns, read_campaign
+from ident.checks import check_campaign, refuse_errors
+from ident.checks import table as findings_table
+from ident.findings import Finding
 from ident.identify import Identification, identify
 from ident.notes import group_unused, group_warnings
 from ident.store import commit, database_rows, digest
@@ -32,6 +35,7 @@ class Fit:
     version : Version that holds them.
     new : False when the latest version held them already.
     digest : Content digest.
+    findings : Of the quality checks, errors first.
     """
 
     campaign: Campaign
@@ -40,6 +44,7 @@ class Fit:
     version: int
     new: bool
     digest: str
+    findings: list[Finding]
 
     def summary(self) -> dict[str, Any]:
         """What a machine wants to know of the fit."""
@@ -53,10 +58,11 @@ class Fit:
             "coefficients": coefficient_table(self.rows),
             "unused": [dict(zip(_UNUSED, u, strict=True)) for u in self.found.unused],
             "warnings": [{"subject": s, "message": m} for s, m in self.found.warnings],
+            "checks": [f.as_json() for f in self.findings],
         }
 
 
-def metadata(campaign: Campaign, found: Identification, message: str) -> dict[str, str]:
+def metadata(campaign: Campaign, found: Identification, message: str, findings: list[Finding]) -> dict[str, str]:
     """What a commit carries beside its rows: provenance, inputs, notes of the fit."""
     header = campaign.header
     return {
@@ -69,11 +75,12 @@ def metadata(campaign: Campaign, found: Identification, message: str) -> dict[st
         "unused": json.dumps(found.unused),
         "warnings": json.dumps(found.warnings),
         "quality": json.dumps({k: q.model_dump() for k, q in header.quality.items()}),
+        "checks": json.dumps([f.as_json() for f in findings]),
         "message": message,
     }
 
 
-def fit(folder: Path, db: str, message: str = "") -> list[Fit]:
+def fit(folder: Path, db: str, message: str = "", strict: bool = False) -> list[Fit]:
     """Fit every campaign at or below ``folder`` into the database.
 
     Parameters
@@ -81,6 +88,7 @@ def fit(folder: Path, db: str, message: str = "") -> list[Fit]:
     folder : Campaign folder, or a folder of campaign folders.
     db : Database path or URL.
     message : Stored with the version.
+    strict : Refuse a campaign with a quality finding of severity ``error``.
 
     Returns
     -------
@@ -98,12 +106,16 @@ def fit(folder: Path, db: str, message: str = "") -> list[Fit]:
         if names.count(name) > 1:
             text = "one campaign a vehicle: a version replaces all rows of its vehicle"
             raise InputError(str(path / "campaign.toml"), f"vehicle {name!r} has {names.count(name)} campaigns", text)
+    checked = [check_campaign(campaign, path) for path, campaign in zip(paths, read, strict=True)]
+    if strict:
+        for path, findings in zip(paths, checked, strict=True):
+            refuse_errors(path, findings)
     identified = [(campaign, identify(campaign)) for campaign in read]
     ready = [(campaign, found, database_rows(found)) for campaign, found in identified]
     done = []
-    for campaign, found, rows in ready:
-        version, new = commit(db, rows, metadata(campaign, found, message))
-        done.append(Fit(campaign, found, rows, version, new, digest(rows)))
+    for (campaign, found, rows), findings in zip(ready, checked, strict=True):
+        version, new = commit(db, rows, metadata(campaign, found, message, findings))
+        done.append(Fit(campaign, found, rows, version, new, digest(rows), findings))
     return done
 
 
@@ -138,6 +150,9 @@ def show(done: Fit, console: Console) -> None:
     from rich.markup import escape
     from rich.table import Table
 
+    serious = [f for f in done.findings if f.severity != "info"]
+    if serious:
+        console.print(findings_table(serious, f"Quality checks: {len(serious)} of {len(done.findings)} findings"))
     table = Table(title=f"{done.campaign.vehicle.title}: {done.campaign.header.name}", title_justify="left")
     for column, justify in (
         ("coefficient", "left"),

@@ -320,7 +320,7 @@ def _error_covariance(equations: list[Equation], sigma: Array) -> Array:
     return covariance
 
 
-def _check_levers(solver: Solver) -> None:
+def check_levers(solver: Solver) -> None:
     """Warn where a section's lever in the runs is not the vehicle file's."""
     runs, sections = solver.campaign.runs, solver.vehicle.sections
     if sections is None or not {"x", "y", "z"} <= set(runs):
@@ -366,7 +366,7 @@ def identify(campaign: Campaign) -> Identification:
     Identification; runs that could not be used are listed with the reason.
     """
     solver = Solver(campaign)
-    _check_levers(solver)
+    check_levers(solver)
     stages = tests()["stage"]
     for stage in sorted(stages.unique()):
         runs = campaign.runs[campaign.runs["test"].map(stages) == stage]

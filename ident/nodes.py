@@ -32,6 +32,13 @@ def key_point(values: Sequence[float]) -> Point:
     return tuple(float(f"{v:.12g}") + 0.0 for v in values)
 
 
+def vanishes(term: Term, part: str, vehicle: Vehicle) -> bool:
+    """True for a coefficient that port/starboard symmetry makes zero at every point."""
+    mirror = mirror_of(term, part, vehicle)
+    own = (mirror.name, mirror.part) == (term.name, part)
+    return own and mirror.sign < 0 and min(mirror.axis_signs, default=1) > 0
+
+
 def table_points(
     nodes: Sequence[Node], term: Term, part: str, vehicle: Vehicle
 ) -> tuple[list[Point], list[int], list[int]]:

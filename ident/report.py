@@ -15,6 +15,7 @@ from typing import Any
 import pandas as pd
 
 from ident.derivatives import checks, derivatives
+from ident.findings import spans
 from ident.notes import group_unused, group_warnings
 from ident.report_figures import draw_figures, equations, quality_colours
 from sim import catalogue
@@ -199,6 +200,7 @@ def _content(db: str, number: int, vehicle: Vehicle, rows: pd.DataFrame) -> dict
         "signs": _signs(Coefficients(vehicle, rows), rows),
         "warnings": group_warnings(_stored(commit.metadata, "warnings", [])),
         "unused": group_unused(_stored(commit.metadata, "unused", [])),
+        "checks": _stored(commit.metadata, "checks", []) if "checks" in commit.metadata else None,
         "vocabulary": vocabulary,
         "colours": colours,
         "errata": _errata(),
@@ -243,6 +245,7 @@ def write_report(db: str, version: int | None, out: Path, vehicle: str = "bb2") 
     boat = load_vehicle(vehicle)
     rows, number = read_rows(db, version, boat.name)
     templates = Templates(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    templates.filters["spans"] = spans
     source = (files("ident") / "templates" / "report.html.j2").read_text("utf-8")
     page = templates.from_string(source).render(_content(db, number, boat, rows))
     path = Path(out) / f"{re.sub(r'[^A-Za-z0-9._-]', '_', boat.name)}_v{number}.html"
