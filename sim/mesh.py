@@ -91,19 +91,16 @@ class Mesh:
         above = height >= 0.0
         cut = np.flatnonzero(above.any(axis=1) & ~above.all(axis=1))
         first, second = (axis + 1) % 3, (axis + 2) % 3
-        ends = []
-        for i in cut:
-            points, h, up = self.corners[i][:, [first, second]], height[i], above[i]
-            crossing = {}
-            for j in range(3):
-                k = (j + 1) % 3
-                if up[j] != up[k]:
-                    crossing[bool(up[j])] = points[j] + (points[k] - points[j]) * (h[j] / (h[j] - h[k]))
-            # Seen from outside the triangle turns left, so the interior lies left of this cut.
-            ends.append((crossing[True], crossing[False]))
-        if not ends:
+        if cut.size == 0:
             return 0.0, np.zeros(2), np.zeros((2, 2))
-        p, q = np.array([e[0] for e in ends]), np.array([e[1] for e in ends])
+        points, h, up = self.corners[cut][:, :, [first, second]], height[cut], above[cut]
+        on = np.roll(up, -1, axis=1)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            share = (h / (h - np.roll(h, -1, axis=1)))[:, :, None]
+            crossing = points + share * (np.roll(points, -1, axis=1) - points)
+        # Seen from outside the triangle turns left, so the interior lies left of the cut
+        # that leads from the edge going down to the edge going up.
+        p, q = crossing[up & ~on], crossing[~up & on]
         cross = p[:, 0] * q[:, 1] - p[:, 1] * q[:, 0]
         area = 0.5 * cross.sum()
         centre = (cross[:, None] * (p + q)).sum(axis=0) / (6.0 * area)
