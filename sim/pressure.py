@@ -45,7 +45,7 @@ def rotation(phi: float, theta: float, psi: float) -> Array:
     return matrix
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@njit(cache=True, error_model="numpy")
 def fill_rotation(phi: float, theta: float, psi: float, out: Array) -> None:
     """``rotation`` into a (3, 3) array."""
     sf, cf, st, ct, sp, cp = sin(phi), cos(phi), sin(theta), cos(theta), sin(psi), cos(psi)

@@ -254,9 +254,9 @@ def _place(sea: Sea, y: Array, time: float, pas: Passage) -> None:
         # Acceleration is the velocity a quarter period earlier times the frequency.
         pas.size[0, j], pas.phase[0, j] = size * w.frequency[j], angle - HALF_PI
         pas.size[1, j], pas.phase[1, j] = size, angle
-    if w.amplitude.size >= MANY:
-        pas.single_size[:] = pas.size
-        pas.single_phase[:] = pas.phase
+        for kind in range(2):
+            pas.single_size[kind, j] = pas.size[kind, j]
+            pas.single_phase[kind, j] = pas.phase[kind, j]
 
 
 @njit(cache=True, error_model="numpy", inline="always")
@@ -270,7 +270,7 @@ def _to_body(sums: Array, m: Array, y: Array, body: Array) -> None:
     body[5] -= y[3] * body[1] - y[4] * body[0]
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@njit(cache=True, error_model="numpy")
 def _add(points: Array, i: int, fx: float, fy: float, fz: float, out: Array, at: int) -> None:
     """Add a vector acting at a point and its moment about the origin."""
     x, y, z = points[i, 0], points[i, 1], points[i, 2]
@@ -299,8 +299,8 @@ def evaluate(sea: Sea, y: Array, time: float, pas: Passage, value: Array, slope:
     _place(sea, y, time, pas)
     sums, body, many = pas.sums, pas.body, sea.waves.amplitude.size >= MANY
     n, s = sea.masses.size, sea.sections.shape[0]
-    value[:] = 0.0
-    slope[:] = 0.0
+    for i in range(value.size):
+        value[i] = slope[i] = 0.0
     for i in range(sea.points.shape[0]):
         kind = 0 if i < n else 1
         if many:
@@ -377,13 +377,12 @@ def advance(sea: Sea, y: Array, time: float, pas: Passage) -> None:
         return
     known = pas.time[0] <= ahead and abs(time - ahead) <= 1e-6 * sea.span
     gain = np.zeros(6)
-    if known:
-        for k in range(6):
-            gain[k] = y[k] - pas.before[k]
-    pas.before[:] = y[:6]
+    for k in range(6):
+        gain[k] = y[k] - pas.before[k] if known else 0.0
+        pas.before[k] = y[k]
     if known and _miss(sea, y, pas) <= sea.reach:
-        pas.value[0] = pas.value[1]
-        pas.slope[0] = pas.slope[1]
+        for i in range(pas.value.shape[1]):
+            pas.value[0, i], pas.slope[0, i] = pas.value[1, i], pas.slope[1, i]
     else:
         evaluate(sea, y, time, pas, pas.value[0], pas.slope[0])
     pas.time[0] = time
