@@ -29,9 +29,9 @@ def seaway():
 
 
 def _state(**changes):
-    names = "u v w p q r x y z phi theta psi".split()
-    values = dict(u=5.0, v=0.3, w=0.2, p=0.01, q=0.02, r=0.03, x=100.0, y=50.0, z=16.0, phi=0.05, theta=0.1, psi=0.7)
-    return np.array([(values | changes)[n] for n in names])
+    values = {"u": 5.0, "v": 0.3, "w": 0.2, "p": 0.01, "q": 0.02, "r": 0.03}
+    values |= {"x": 100.0, "y": 50.0, "z": 16.0, "phi": 0.05, "theta": 0.1, "psi": 0.7}
+    return np.array(list((values | changes).values()))
 
 
 def _evaluate(sea, y, time):
