@@ -70,6 +70,31 @@ class Mesh:
         """Shifted by ``-shift``, then turned by axis signs whose product is +1."""
         return Mesh((self.vertices - np.asarray(shift)) * np.asarray(signs), self.triangles, self.part, self.names)
 
+    def cut(self, axis: int, at: float) -> tuple[Array, Array]:
+        """Edges in which a plane normal to an axis cuts the surface, the interior to their left.
+
+        Parameters
+        ----------
+        axis : 0, 1 or 2.
+        at : Where along it [m].
+
+        Returns
+        -------
+        start, end : (m, 2) in the two other axes, in cyclic order [m].
+        """
+        height = self.corners[:, :, axis] - at
+        # A vertex on the plane counts as above it, so that no cut is lost or doubled.
+        above = height >= 0.0
+        rows = np.flatnonzero(above.any(axis=1) & ~above.all(axis=1))
+        points, h, up = self.corners[rows][:, :, [(axis + 1) % 3, (axis + 2) % 3]], height[rows], above[rows]
+        on = np.roll(up, -1, axis=1)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            share = (h / (h - np.roll(h, -1, axis=1)))[:, :, None]
+            crossing = points + share * (np.roll(points, -1, axis=1) - points)
+        # Seen from outside the triangle turns left, so the interior lies left of the cut
+        # that leads from the edge going down to the edge going up.
+        return crossing[up & ~on], crossing[~up & on]
+
     def section(self, axis: int, at: float) -> tuple[float, Array, Array]:
         """Area, centroid and second moments of the plane section normal to an axis.
 
@@ -86,23 +111,11 @@ class Mesh:
         centre : (2,) centroid along the two other axes, in cyclic order [m].
         moments : (2, 2) central second moments [m^4].
         """
-        height = self.corners[:, :, axis] - at
-        # A vertex on the plane counts as above it, so that no cut is lost or doubled.
-        above = height >= 0.0
-        cut = np.flatnonzero(above.any(axis=1) & ~above.all(axis=1))
-        first, second = (axis + 1) % 3, (axis + 2) % 3
-        if cut.size == 0:
-            return 0.0, np.zeros(2), np.zeros((2, 2))
-        points, h, up = self.corners[cut][:, :, [first, second]], height[cut], above[cut]
-        on = np.roll(up, -1, axis=1)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            share = (h / (h - np.roll(h, -1, axis=1)))[:, :, None]
-            crossing = points + share * (np.roll(points, -1, axis=1) - points)
-        # Seen from outside the triangle turns left, so the interior lies left of the cut
-        # that leads from the edge going down to the edge going up.
-        p, q = crossing[up & ~on], crossing[~up & on]
+        p, q = self.cut(axis, at)
         cross = p[:, 0] * q[:, 1] - p[:, 1] * q[:, 0]
         area = 0.5 * cross.sum()
+        if area == 0.0:
+            return 0.0, np.zeros(2), np.zeros((2, 2))
         centre = (cross[:, None] * (p + q)).sum(axis=0) / (6.0 * area)
         outer = [np.einsum("i,ij,ik->jk", cross, a, b) for a, b in ((p, p), (q, q), (p, q), (q, p))]
         second_moments = (2.0 * (outer[0] + outer[1]) + outer[2] + outer[3]) / 24.0
