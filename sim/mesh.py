@@ -161,11 +161,20 @@ def closed_part(name: str, vertices: Array, triangles: Index) -> Mesh:
 
 
 def joined(parts: Sequence[Mesh]) -> Mesh:
-    """Several parts as one mesh; overlapping volumes count twice."""
+    """Several parts as one mesh; overlapping volumes count twice.
+
+    Raises
+    ------
+    MeshError
+        When two parts have the same name.
+    """
+    names = tuple(p.names[0] for p in parts)
+    if len(set(names)) < len(names):
+        raise MeshError(f"two parts are called {next(n for n in names if names.count(n) > 1)}")
     start = np.cumsum([0, *[len(p.vertices) for p in parts]])
     return Mesh(
         np.concatenate([p.vertices for p in parts]),
         np.concatenate([p.triangles + n for p, n in zip(parts, start, strict=False)]),
         np.concatenate([np.full(len(p.triangles), k, dtype=np.int64) for k, p in enumerate(parts)]),
-        tuple(p.names[0] for p in parts),
+        names,
     )

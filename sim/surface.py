@@ -263,12 +263,24 @@ def sail_mesh(name: str, table: pd.DataFrame, hull: Hull, levels: int) -> Mesh:
     return _loft(name, np.array(rings))
 
 
-def read_geometry(path: str | Path) -> Mesh:
+def _coarser(part: HullPart | SailPart | FoilParts, factor: float) -> HullPart | SailPart | FoilParts:
+    """The same part with panels ``factor`` times as long, as far as its shape allows."""
+    if isinstance(part, HullPart):
+        around = max(8, 2 * round(part.around / factor / 2))
+        return part.model_copy(update={"around": around, "step_m": part.step_m * factor})
+    if isinstance(part, SailPart):
+        return part.model_copy(update={"levels": max(2, round(part.levels / factor))})
+    chord, span = max(4, round(part.along_chord / factor)), max(1, round(part.along_span / factor))
+    return part.model_copy(update={"along_chord": chord, "along_span": span})
+
+
+def read_geometry(path: str | Path, coarser: float = 1.0) -> Mesh:
     """The closed, outward-facing surface that a geometry file describes.
 
     Parameters
     ----------
     path : The geometry file; its tables lie beside it.
+    coarser : Factor on the panel sizes the file asks for; panel methods need fewer panels.
 
     Returns
     -------
@@ -285,7 +297,7 @@ def read_geometry(path: str | Path) -> Mesh:
     folder = Path(where).parent
     hulls: dict[str, Hull] = {}
     parts: list[Mesh] = []
-    for part in geometry.parts:
+    for part in (_coarser(p, coarser) if coarser != 1.0 else p for p in geometry.parts):
         offsets = folder / part.offsets
         if isinstance(part, HullPart):
             hulls[part.name] = Hull(offsets)

@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 
 from sim.errors import InputError
-from sim.mesh import Mesh, MeshError
+from sim.mesh import Mesh, MeshError, joined
 from sim.surface import Hull, hull_mesh, read_geometry
 
 BB2 = Path(__file__).parents[1] / "sim" / "vehicles" / "bb2"
@@ -126,6 +126,8 @@ def test_a_hole_and_inward_normals_are_refused(mesh):
     inward = Mesh(mesh.vertices, mesh.triangles[:, ::-1], mesh.part, mesh.names)
     with pytest.raises(MeshError, match="normals point inward"):
         inward.check()
+    with pytest.raises(MeshError, match="two parts are called hull"):
+        joined([mesh.only("hull"), mesh.only("hull")])
 
 
 @pytest.mark.parametrize(
