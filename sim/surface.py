@@ -37,7 +37,7 @@ _FOIL_COLUMNS = [
 ]
 _SAIL_COLUMNS = ["x_m", "y_wall_m", "z_wall_top_m", "y_shoulder_m", "z_shoulder_m", "y_mid_m", "z_mid_m", "z_top_m"]
 # Half thickness of a NACA four-digit section over the thickness ratio, Abbott and von Doenhoff (1959).
-_NACA = (1.4845, -0.63, -1.758, 1.4215, -0.5075)
+_NACA = (5 * 0.2969, -5 * 0.126, -5 * 0.3516, 5 * 0.2843, -5 * 0.1015)
 
 
 class HullPart(Data):

@@ -41,8 +41,8 @@ def test_solid_angle_tells_inside_from_outside():
 
 def test_overlapping_parts_lose_their_inner_panels(tmp_path):
     """Two spheroids half inside each other: what is left encloses their union, to the ragged rim."""
-    one = _spheroid(tmp_path, 6.0, 4.0, 48, 0.4)
-    other = _spheroid(tmp_path, 6.0, 4.0, 48, 0.4, name="other")
+    one = _spheroid(tmp_path, 6.0, 4.0, 32, 0.6)
+    other = _spheroid(tmp_path, 6.0, 4.0, 32, 0.6, name="other")
     both = joined([one, other.moved((-5.0, 0.0, 0.0))])
     left = wetted_panels(both)
     assert 0.5 * len(both.triangles) < len(left.triangles) < 0.9 * len(both.triangles)
@@ -62,7 +62,7 @@ def test_without_capytaine_the_message_says_what_to_install(tmp_path):
 @panels
 def test_spheroid_has_lambs_added_mass(tmp_path):
     """k1 and k2 of a prolate spheroid of 3 to 1 (Lamb 1932, art. 114): 0.122 and 0.803."""
-    mesh = _spheroid(tmp_path, 12.0, 4.0)
+    mesh = _spheroid(tmp_path, 12.0, 4.0, 28, 1.1)
     added, damping = panel_added_mass(mesh, np.inf, [np.inf], RHO, G)
     ratio = np.diag(added[0])[:3] / (RHO * 4.0 / 3.0 * np.pi * 12.0 * 16.0)
     assert ratio == pytest.approx([0.122, 0.803, 0.803], rel=0.04)
@@ -98,6 +98,6 @@ def test_depth_ratios_of_bb2_are_the_published_ones():
     found = depth_table(mesh, -11.37, [2.5], [0.0, 0.66, np.inf], RHO, G)
     for _, row in found.iterrows():
         omega = table["omega"].astype(float)
-        known = table[(table["D0_m"] == "2.5") & (omega == row.omega_radps)].iloc[0]
+        known = table[(table["D0_m"].astype(float) == 2.5) & (omega == row.omega_radps)].iloc[0]
         for i in range(1, 7):
             assert row[f"ratio{i}{i}"] == pytest.approx(float(known[f"ratio{i}{i}"]), abs=0.01)
