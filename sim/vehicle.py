@@ -54,12 +54,13 @@ class Particulars(Data):
 
 
 class Propeller(Data):
-    """Propeller diameter and the limits of its revolutions."""
+    """Propeller diameter, the limits of its revolutions, and where it is (waves need that)."""
 
     name: str
     diameter: Number
     limits: Limits
     rate: Number
+    position: Triple | None = None
 
 
 class Mixer(Data):
@@ -133,7 +134,10 @@ class Axes(FrameData):
 
 
 class Vehicle(Data):
-    """A vehicle file, turned to the program frame by ``load_vehicle``."""
+    """A vehicle file, turned to the program frame by ``load_vehicle``.
+
+    ``geometry`` names its surface (``sim.surface``), relative to the vehicle file; waves need it.
+    """
 
     name: str
     title: str
@@ -146,6 +150,7 @@ class Vehicle(Data):
     planes: list[Plane] = Field(default_factory=list)
     sections: Sections | None = None
     tanks: Tanks | None = None
+    geometry: str | None = None
 
     @field_validator("planes")
     @classmethod
@@ -170,6 +175,8 @@ class Vehicle(Data):
         if data["tanks"]:
             tank = data["tanks"]["ballast"]["position"]
             tank["value"] = turn(tank["value"])
+        if data["propeller"]["position"]:
+            data["propeller"]["position"]["value"] = turn(data["propeller"]["position"]["value"])
         for plane in data["planes"]:
             for key in ("position", "span_axis", "leading_edge"):
                 plane[key] = turn(plane[key])
@@ -230,4 +237,7 @@ def load_vehicle(name: str | Path = "bb2", beside: str | Path = "") -> Vehicle:
     data, where = read_toml(Path(beside).parent / path if path.suffix == ".toml" else name, "vehicles")
     vehicle = checked(Vehicle, data, where)
     vehicle.frame.declared(where)
+    if vehicle.geometry is not None:
+        folder = Path(where).parent if Path(where).suffix == ".toml" else Path(str(files("sim") / "vehicles"))
+        vehicle.geometry = str(folder / vehicle.geometry)
     return vehicle.turned(PROGRAM)

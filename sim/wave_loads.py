@@ -1,0 +1,341 @@
+"""Loads of waves on a submerged boat and the water's velocity where it is felt, compiled.
+
+Three linear functions of one wave field, over points fixed in the boat:
+
+* Froude-Krylov force, rho dv/dt summed over the volume points of ``sim.pressure``;
+* the added-mass impulse of the sections of Eqs. (36)-(41), I = sum J_i^T c_i m_i v_wave(r_i)
+  with J = [1, -[r]x], whose rate in body axes is the added-mass load of the waves. With the
+  hull's own -A d(nu)/dt on the left-hand side the load is -A d(nu - nu_water)/dt, where
+* nu_water = A^-1 I is the rigid motion with the same impulse: what the drift, rotation and
+  rotating-arm tables see as the water's motion; and the velocity at planes and propeller.
+
+The rate follows the sections as they move (encounter frequency), less Omega x v, because
+the tables hold the Munk and centripetal parts for the relative motion.
+
+All waves are summed once per ``span`` seconds at the predicted place of the boat, with
+rates, and interpolated by cubic Hermite polynomials in between. Sums of many components run
+in single precision (1e-6 of the load) on phases reduced in double precision.
+"""
+
+from __future__ import annotations
+
+from math import exp, floor, sqrt
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from sim.pressure import Quadrature, fill_rotation
+from sim.wave_sums import sum_few, sum_many
+from sim.waves import Waves
+
+Array = NDArray[np.float64]
+Single = NDArray[np.float32]
+
+# Layout of the vector of wave quantities: then three velocities a probe.
+FORCE, IMPULSE, WATER, PROBES = 0, 6, 12, 18
+# From this many components on, single precision in vector registers is faster.
+MANY = 8
+TWO_PI, HALF_PI = 2.0 * np.pi, 0.5 * np.pi
+
+
+class Sea(NamedTuple):
+    """Waves and the boat's points in them; shared by threads.
+
+    waves : Components; a sea without components is calm and must not be evaluated.
+    single : (6, n) k, k cos chi, k sin chi, omega, cos chi, sin chi in single precision.
+    points : (v + s + p, 3) volume points, section centres, probes in the body frame [m].
+    masses : (v,) rho V of the volume points [kg].
+    sections : (s, 3) c m in x, y, z of the sections [kg].
+    compliance : (6, 6) inverse of the added mass; zero where there is none.
+    span : Time between sums [s]. reach : Largest miss of a predicted point that is accepted [m].
+    """
+
+    waves: Waves
+    single: Single
+    points: Array
+    masses: Array
+    sections: Array
+    compliance: Array
+    span: float
+    reach: float
+
+
+class Passage(NamedTuple):
+    """Sums before and after the present and scratch arrays; one a thread.
+
+    time : (2,) of the sums [s]; time[1] < time[0] before the first.
+    value, slope : (2, n) quantities in the layout FORCE, IMPULSE, WATER, PROBES and their rates.
+    state : (12,) predicted for time[1]. before : (6,) velocities at time[0].
+    """
+
+    time: Array
+    value: Array
+    slope: Array
+    state: Array
+    before: Array
+    size: Array
+    phase: Array
+    single_size: Single
+    single_phase: Single
+    place: Array
+    motion: Array
+    sums: Array
+    body: Array
+    matrix: Array
+
+
+def make_sea(
+    waves: Waves,
+    volume: Quadrature,
+    centres: Array,
+    masses: Array,
+    probes: Array,
+    span: float = 0.4,
+    reach: float = 0.05,
+) -> Sea:
+    """Waves and a boat in them.
+
+    Parameters
+    ----------
+    waves : Components.
+    volume : Volume points of the hull.
+    centres, masses : (s, 3) section centres [m] and c m in x, y, z [kg], Table 6.
+    probes : (p, 3) where the water's velocity is wanted: planes, then propeller [m].
+    span : Time between sums [s]; the error of the loads falls with its fourth power.
+    reach : Largest accepted miss of a predicted point before the sum is done again [m].
+
+    Raises
+    ------
+    ValueError
+        For a span that is not positive.
+    """
+    if not span > 0.0:
+        raise ValueError("span must be positive")
+    centres, masses, probes = (np.reshape(np.asarray(a, dtype=float), (-1, 3)) for a in (centres, masses, probes))
+    added = np.zeros((6, 6))
+    for r, m in zip(centres, masses, strict=True):
+        x, y, z = r
+        motion = np.hstack([np.eye(3), -np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])])
+        added += motion.T @ (m[:, None] * motion)
+    k, w = waves.number, waves.frequency
+    single = np.stack([k, k * waves.north, k * waves.east, w, waves.north, waves.east])
+    return Sea(
+        waves,
+        np.ascontiguousarray(single, dtype=np.float32),
+        np.concatenate([volume.points, centres, probes]),
+        waves.density * volume.volumes,
+        masses,
+        np.asarray(np.linalg.pinv(added, rcond=1e-12, hermitian=True), dtype=float),
+        float(span),
+        float(reach),
+    )
+
+
+def passage(sea: Sea) -> Passage:
+    """Empty sums for one thread."""
+    n, points = sea.waves.amplitude.size, len(sea.points)
+    width = PROBES + 3 * (points - len(sea.masses) - len(sea.sections))
+    return Passage(
+        time=np.array([0.0, -1.0]),
+        value=np.zeros((2, width)),
+        slope=np.zeros((2, width)),
+        state=np.zeros(12),
+        before=np.zeros(6),
+        size=np.zeros((2, n)),
+        phase=np.zeros((2, n)),
+        single_size=np.zeros((2, n), dtype=np.float32),
+        single_phase=np.zeros((2, n), dtype=np.float32),
+        place=np.zeros((points, 3)),
+        motion=np.zeros((points, 3)),
+        sums=np.zeros(6),
+        body=np.zeros(6),
+        matrix=np.zeros((3, 3)),
+    )
+
+
+@njit(cache=True, error_model="numpy")
+def _place(sea: Sea, y: Array, time: float, pas: Passage) -> None:
+    """Points and their velocities from the shallowest one, in earth axes; phases and sizes there."""
+    m, w = pas.matrix, sea.waves
+    fill_rotation(y[9], y[10], y[11], m)
+    top = np.inf
+    for i in range(sea.points.shape[0]):
+        a, b, c = sea.points[i, 0], sea.points[i, 1], sea.points[i, 2]
+        u = y[0] + y[4] * c - y[5] * b
+        v = y[1] + y[5] * a - y[3] * c
+        d = y[2] + y[3] * b - y[4] * a
+        for k in range(3):
+            pas.place[i, k] = m[k, 0] * a + m[k, 1] * b + m[k, 2] * c
+            pas.motion[i, k] = m[k, 0] * u + m[k, 1] * v + m[k, 2] * d
+        # Above the calm surface the waves keep the values they have there.
+        pas.place[i, 2] = max(y[8] + pas.place[i, 2], 0.0)
+        top = min(top, pas.place[i, 2])
+    for i in range(sea.points.shape[0]):
+        pas.place[i, 2] -= top
+    for j in range(w.amplitude.size):
+        angle = w.number[j] * (w.north[j] * y[6] + w.east[j] * y[7]) - w.frequency[j] * time + w.phase[j]
+        angle -= TWO_PI * floor(angle / TWO_PI)
+        size = w.amplitude[j] * w.frequency[j] * exp(-w.number[j] * top)
+        # Acceleration is the velocity a quarter period earlier times the frequency.
+        pas.size[0, j], pas.phase[0, j] = size * w.frequency[j], angle - HALF_PI
+        pas.size[1, j], pas.phase[1, j] = size, angle
+        for kind in range(2):
+            pas.single_size[kind, j] = pas.size[kind, j]
+            pas.single_phase[kind, j] = pas.phase[kind, j]
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def _to_body(sums: Array, m: Array, y: Array, body: Array) -> None:
+    """Earth vector and rate to body axes; the rate is that of the body-axis components."""
+    for k in range(3):
+        body[k] = m[0, k] * sums[0] + m[1, k] * sums[1] + m[2, k] * sums[2]
+        body[3 + k] = m[0, k] * sums[3] + m[1, k] * sums[4] + m[2, k] * sums[5]
+    body[3] -= y[4] * body[2] - y[5] * body[1]
+    body[4] -= y[5] * body[0] - y[3] * body[2]
+    body[5] -= y[3] * body[1] - y[4] * body[0]
+
+
+@njit(cache=True, error_model="numpy")
+def _add(points: Array, i: int, fx: float, fy: float, fz: float, out: Array, at: int) -> None:
+    """Add a vector acting at a point and its moment about the origin."""
+    x, y, z = points[i, 0], points[i, 1], points[i, 2]
+    out[at] += fx
+    out[at + 1] += fy
+    out[at + 2] += fz
+    out[at + 3] += y * fz - z * fy
+    out[at + 4] += z * fx - x * fz
+    out[at + 5] += x * fy - y * fx
+
+
+@njit(cache=True, error_model="numpy")
+def evaluate(sea: Sea, y: Array, time: float, pas: Passage, value: Array, slope: Array) -> None:
+    """Every wave quantity at a state, exactly, with its rate along the present motion.
+
+    Parameters
+    ----------
+    sea : With at least one component.
+    y : (12,) state.
+    time : [s].
+    pas : Scratch arrays.
+    value, slope : (n,) results, body axes about the body origin: FORCE Froude-Krylov load
+        [N, N m], IMPULSE [kg m/s, kg m^2/s], WATER u v w p q r [m/s, rad/s], PROBES three
+        velocities each [m/s]; and their rates. The rate of IMPULSE is the added-mass load.
+    """
+    _place(sea, y, time, pas)
+    sums, body, many = pas.sums, pas.body, sea.waves.amplitude.size >= MANY
+    n, s = sea.masses.size, sea.sections.shape[0]
+    for i in range(value.size):
+        value[i] = slope[i] = 0.0
+    for i in range(sea.points.shape[0]):
+        kind = 0 if i < n else 1
+        if many:
+            sum_many(sea.single, pas.single_size, pas.single_phase, kind, pas.place, pas.motion, i, sums)
+        else:
+            sum_few(sea.waves, pas.size, pas.phase, kind, pas.place, pas.motion, i, sums)
+        _to_body(sums, pas.matrix, y, body)
+        if i < n:
+            m = sea.masses[i]
+            _add(sea.points, i, m * body[0], m * body[1], m * body[2], value, FORCE)
+            _add(sea.points, i, m * body[3], m * body[4], m * body[5], slope, FORCE)
+        elif i < n + s:
+            m0, m1, m2 = sea.sections[i - n, 0], sea.sections[i - n, 1], sea.sections[i - n, 2]
+            _add(sea.points, i, m0 * body[0], m1 * body[1], m2 * body[2], value, IMPULSE)
+            _add(sea.points, i, m0 * body[3], m1 * body[4], m2 * body[5], slope, IMPULSE)
+        else:
+            at = PROBES + 3 * (i - n - s)
+            for k in range(3):
+                value[at + k] = body[k]
+                slope[at + k] = body[3 + k]
+    for i in range(6):
+        for j in range(6):
+            value[WATER + i] += sea.compliance[i, j] * value[IMPULSE + j]
+            slope[WATER + i] += sea.compliance[i, j] * slope[IMPULSE + j]
+
+
+@njit(cache=True, error_model="numpy")
+def _predict(y: Array, h: float, gain: Array, matrix: Array, out: Array) -> None:
+    """State after h when the velocities change by ``gain``, second order in h."""
+    mean = np.empty(6)
+    for k in range(6):
+        mean[k] = y[k] + 0.5 * gain[k]
+        out[k] = y[k] + gain[k]
+    phi, theta, psi = y[9], y[10], y[11]
+    for _ in range(2):
+        # Rates of the angles at the start, then at half time.
+        fill_rotation(phi, theta, psi, matrix)
+        ct = max(sqrt(matrix[2, 1] * matrix[2, 1] + matrix[2, 2] * matrix[2, 2]), 1e-6)
+        turn = (mean[4] * matrix[2, 1] + mean[5] * matrix[2, 2]) / (ct * ct)
+        dphi = mean[3] - turn * matrix[2, 0]
+        dtheta = (mean[4] * matrix[2, 2] - mean[5] * matrix[2, 1]) / ct
+        phi, theta, psi = y[9] + 0.5 * h * dphi, y[10] + 0.5 * h * dtheta, y[11] + 0.5 * h * turn
+    for k in range(3):
+        out[6 + k] = y[6 + k] + h * (matrix[k, 0] * mean[0] + matrix[k, 1] * mean[1] + matrix[k, 2] * mean[2])
+    out[9], out[10], out[11] = y[9] + h * dphi, y[10] + h * dtheta, y[11] + h * turn
+
+
+@njit(cache=True, error_model="numpy")
+def _miss(sea: Sea, y: Array, pas: Passage) -> float:
+    """Largest distance of a point from where it was predicted [m], and of its velocity over a span."""
+    size = 0.0
+    for i in range(sea.points.shape[0]):
+        size = max(size, abs(sea.points[i, 0]))
+    miss = 0.0
+    for k in range(3):
+        place, turn = abs(y[6 + k] - pas.state[6 + k]), abs(y[9 + k] - pas.state[9 + k])
+        speed, rate = abs(y[k] - pas.state[k]), abs(y[3 + k] - pas.state[3 + k])
+        miss = max(miss, place + size * turn, sea.span * (speed + size * rate))
+    return miss
+
+
+@njit(cache=True, error_model="numpy")
+def advance(sea: Sea, y: Array, time: float, pas: Passage) -> None:
+    """Make the sums cover the time from now on; call it before a step, not within one.
+
+    Parameters
+    ----------
+    sea, pas : Of this boat and thread.
+    y : (12,) state now.
+    time : Now [s].
+    """
+    ahead = pas.time[1]
+    if pas.time[0] <= time < ahead - 1e-9 * sea.span:
+        return
+    known = pas.time[0] <= ahead and abs(time - ahead) <= 1e-6 * sea.span
+    gain = np.zeros(6)
+    for k in range(6):
+        gain[k] = y[k] - pas.before[k] if known else 0.0
+        pas.before[k] = y[k]
+    if known and _miss(sea, y, pas) <= sea.reach:
+        for i in range(pas.value.shape[1]):
+            pas.value[0, i], pas.slope[0, i] = pas.value[1, i], pas.slope[1, i]
+    else:
+        evaluate(sea, y, time, pas, pas.value[0], pas.slope[0])
+    pas.time[0] = time
+    pas.time[1] = time + sea.span
+    _predict(y, sea.span, gain, pas.matrix, pas.state)
+    evaluate(sea, pas.state, pas.time[1], pas, pas.value[1], pas.slope[1])
+
+
+@njit(cache=True, error_model="numpy")
+def at(pas: Passage, time: float, out: Array) -> None:
+    """Wave quantities at a time inside the present span, by cubic Hermite interpolation.
+
+    Parameters
+    ----------
+    pas : After ``advance``.
+    time : [s].
+    out : (n,) FORCE the whole wave load X Y Z K M N, Froude-Krylov and added mass
+        [N, N m]; IMPULSE as it is; WATER u v w p q r; PROBES.
+    """
+    h = pas.time[1] - pas.time[0]
+    t = (time - pas.time[0]) / h
+    a, b = (1.0 + 2.0 * t) * (1.0 - t) * (1.0 - t), t * t * (3.0 - 2.0 * t)
+    c, d = h * t * (1.0 - t) * (1.0 - t), h * t * t * (t - 1.0)
+    for i in range(out.size):
+        out[i] = a * pas.value[0, i] + b * pas.value[1, i] + c * pas.slope[0, i] + d * pas.slope[1, i]
+    e, f, g = 6.0 * t * (1.0 - t) / h, (1.0 - t) * (1.0 - 3.0 * t), t * (3.0 * t - 2.0)
+    for i in range(6):
+        k = IMPULSE + i
+        out[i] += e * (pas.value[1, k] - pas.value[0, k]) + f * pas.slope[0, k] + g * pas.slope[1, k]
