@@ -19,16 +19,17 @@ import numpy as np
 import pandas as pd
 from pydantic import Field
 
+from ident import published
 from sim.catalogue import ACCELERATIONS, OUTPUTS
 from sim.errors import InputError
 from sim.frames import Frame
 from sim.schema import Data, FrameData, checked
 from sim.vehicle import Vehicle, load_vehicle
 
-TEXT = ("run_id", "test", "part", "quality", "source", "copy_of", "exclude", "reason", "decoupled")
+TEXT = ("run_id", "test", "part", "quality", "source", "copy_of", "exclude", "reason", "decoupled", "coefficient")
 REQUIRED = ("run_id", "test", "part", "quality", "source")
 MOTION = ("p", "q", "r", *ACCELERATIONS)
-DIRECT = ("KT", "KQ", "t")
+DIRECT = ("KT", "KQ", "t", "value")
 
 # Larger numbers are slips of the pen, and their powers leave the floating-point range.
 _LARGEST = 1e15
@@ -111,7 +112,7 @@ class Campaign:
     vehicle : The vehicle the runs belong to.
     runs : One row a run; columns U, alpha, beta, D0, p..r, accelerations, plane, n, J in
         SI and radians, X..N [N, N m] about the vehicle's origin, s_X..s_N standard errors,
-        KT KQ t with s_KT.., and the text columns plus ``file`` and ``row``.
+        KT KQ t with s_KT.., ``value`` of a published ``coefficient``, and the text columns plus ``file`` and ``row``.
     digests : SHA-256 of every input file.
     """
 
@@ -136,8 +137,8 @@ def _quantities() -> dict[str, tuple[str, float]]:
     known = {}
     for q, unit, factor in zip(table["quantity"], table["unit"], table["factor"], strict=True):
         known[f"{q}_{unit}" if unit else q] = (str(q), float(factor))
-        if q in OUTPUTS:
-            known[f"sigma_{q}_{unit}"] = (f"s_{q}", float(factor))
+        if q in (*OUTPUTS, "value"):
+            known[f"sigma_{q}_{unit}" if unit else f"sigma_{q}"] = (f"s_{q}", float(factor))
     return known
 
 
@@ -258,7 +259,7 @@ def _check_complete(path: Path, runs: pd.DataFrame) -> None:
             raise InputError(f"{place}, column U", str(run["U"]), text)
         measured = [o for o in (*OUTPUTS, *DIRECT) if pd.notna(run.get(o, np.nan))]
         if not measured:
-            raise InputError(place, "no load and no coefficient", "at least one of X Y Z K M N, KT KQ, t")
+            raise InputError(place, "no load and no coefficient", "at least one of X Y Z K M N, KT KQ, t, value")
         wrong = [w for w in run["exclude"].split() if w not in (*OUTPUTS, *DIRECT)]
         if wrong:
             raise InputError(f"{place}, column exclude", repr(wrong[0]), ", ".join((*OUTPUTS, *DIRECT)))
@@ -321,7 +322,7 @@ def _standard_errors(runs: pd.DataFrame, header: CampaignFile, length: float) ->
     still = {k: out[k].fillna(0.0) == 0.0 for k in MOTION}
     along = np.cos(out["alpha"].fillna(0.0)) * np.cos(out["beta"].fillna(0.0))
     still["u"] = pd.Series(along, index=out.index).abs() < _ACROSS
-    kind = pd.DataFrame(still).apply(lambda moves: "".join("01"[m] for m in moves), axis=1)
+    kind = pd.DataFrame(still).apply(lambda moves: "".join("01"[m] for m in moves), axis=1) + out["coefficient"]
     rate2 = sum(out[c].fillna(0.0) ** 2 for c in ("p", "q", "r"))
     dynamic = out["U"].fillna(0.0) ** 2 + rate2 * length**2
     for name in (*OUTPUTS, *DIRECT):
@@ -371,6 +372,7 @@ def read_campaign(folder: Path) -> Campaign:
     runs = _to_full_scale(_turn(runs, frame), header.scale.ratio)
     point = header.moment_point
     at = [header.scale.ratio * c for c in frame.vector([point.x_m, point.y_m, point.z_m])]
+    runs = published.to_program(runs, vehicle, frame, header.scale.ratio * header.scale.length_m, at, str(folder))
     runs = _standard_errors(_move_moments(runs, at), header, header.scale.ratio * header.scale.length_m)
     return Campaign(header, vehicle, runs, digests)
 

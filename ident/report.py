@@ -20,7 +20,7 @@ from ident.report_figures import draw_figures, equations, quality_colours
 from sim import catalogue
 from sim.catalogue import RULES, Term
 from sim.coefficients import Coefficients
-from sim.database import Version, axis_columns, read_rows, versions
+from sim.database import Version, axis_columns, own_version, read_rows
 from sim.errors import InputError
 from sim.frames import PROGRAM
 from sim.model import Environment
@@ -38,13 +38,6 @@ def _stored(metadata: dict[str, str], key: str, default: Any) -> Any:
     except ValueError:
         return default
     return found if isinstance(found, type(default)) else default
-
-
-def _commit(db: str, number: int, vehicle: str) -> Version:
-    """The commit that wrote the vehicle's rows of a version: others may have come later."""
-    history = [v for v in versions(db) if v.number <= number]
-    own = [v for v in history if v.metadata.get("vehicle", vehicle) == vehicle]
-    return (own or history or [Version(number, "", {})])[-1]
 
 
 def _time(stamp: str) -> str:
@@ -103,7 +96,9 @@ def _notes(term: Term, rows: pd.DataFrame) -> list[str]:
         both = (rows[columns["alpha"]] != 0.0) & (rows[columns["beta"]] != 0.0)
         if not both.any():
             notes.append("no run has alpha and beta together: superposed")
-    if not (rows["origin"] == "measured").any():
+    if (rows["origin"] == "published").any():
+        notes.append("given by the source as a coefficient, not by runs")
+    elif not (rows["origin"] == "measured").any():
         notes.append("all from the partner plane's runs by the mirror")
     return notes
 
@@ -127,7 +122,7 @@ def _coverage(vehicle: Vehicle, rows: pd.DataFrame, factors: dict[str, float]) -
             origin = own["origin"].value_counts()
             words = sorted({q for q in own["quality"] if q}, key=lambda q: factors.get(q, 0.0))
             row |= {
-                "measured": int(origin.get("measured", 0)),
+                "measured": int(origin.get("measured", 0) + origin.get("published", 0)),
                 "mirror": int(origin.get("mirror", 0)),
                 "symmetry": int(origin.get("symmetry", 0)),
                 "ranges": _ranges(term, own),
@@ -177,7 +172,7 @@ def _errata() -> list[dict[str, str]]:
 
 def _content(db: str, number: int, vehicle: Vehicle, rows: pd.DataFrame) -> dict[str, Any]:
     """Everything the template shows."""
-    commit = _commit(db, number, vehicle.name)
+    commit = own_version(db, vehicle.name, number)
     vocabulary = _vocabulary(commit.metadata, rows)
     colours = quality_colours(q["word"] for q in vocabulary)
     coverage = _coverage(vehicle, rows, {q["word"]: q["factor"] or 1.0 for q in vocabulary})

@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ident.validate import Validation, validate
-from sim.database import find_version
+from sim.case import load_case
+from sim.database import find_version, own_version, read_rows
 from sim.errors import InputError
 from sim.vehicle import bundled
 
@@ -35,6 +36,15 @@ def case_names(folder: Path | None) -> list[str]:
     return names + found
 
 
+def _flyable(names: list[str], present: set[str]) -> list[str]:
+    """Without the bundled cases of vehicles the database does not hold."""
+    own = bundled("cases")
+    found = [name for name in names if name not in own or load_case(name)[0].vehicle in present]
+    if not found:
+        raise InputError(f"vehicles {', '.join(sorted(present))}", "no case of them", "a folder of cases: --cases DIR")
+    return found
+
+
 def _mean_ratio(cases: list[dict[str, Any]]) -> float | None:
     ratios = [
         entry["ratio"]
@@ -49,7 +59,7 @@ def _mean_ratio(cases: list[dict[str, Any]]) -> float | None:
 def run_all(
     db: str, version: int | None, folder: Path | None, each: Callable[[str], None] = lambda name: None
 ) -> tuple[dict[str, Any], list[Validation]]:
-    """Fly every case from one version.
+    """Fly every case from one version; bundled cases only of vehicles it holds.
 
     Parameters
     ----------
@@ -69,14 +79,15 @@ def run_all(
     InputError
         As ``ident.validate.validate``.
     """
-    names = case_names(folder)
     record = find_version(db, version)
-    trained = json.loads(record.metadata.get("trained", "[]"))
+    present = {str(v) for v in read_rows(db, record.number)[0]["vehicle"].unique()}
+    names = _flyable(case_names(folder), present)
     flown, cases = [], []
     for name in names:
         each(name)
         done = validate(name, db, record.number)
         flown.append(done)
+        trained = json.loads(own_version(db, done.vehicle.name, record.number).metadata.get("trained", "[]"))
         cases.append({**done.result, "trained": done.case.name in trained})
     board = {
         "database": {"path": db, "version": record.number, "digest": record.digest},

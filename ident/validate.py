@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ident.metrics import roll_decay, zigzag
 from sim.case import Case, Series, in_radians, load_case, load_reference
 from sim.coefficients import Coefficient, Coefficients
-from sim.database import axis_columns, find_version, read_rows
+from sim.database import axis_columns, own_version, read_rows
 from sim.errors import InputError
 from sim.forces import boat_features, plane_features
 from sim.simulate import CHANNELS, Simulation, simulate
@@ -252,12 +252,13 @@ def validate(name: str, db: str, version: int | None = None) -> Validation:
     rows, number = read_rows(db, version, vehicle.name)
     coefficients = Coefficients(vehicle, rows)
     simulation = simulate(case, coefficients)
+    commit = own_version(db, vehicle.name, number)
     errors = _errors(case, simulation, reference)
     outside, constant = _outside(simulation, coefficients)
     complete = simulation["t"][-1] >= case.run.duration_s - case.run.record_s
     result = {
         "case": case.name,
-        "database": {"path": db, "version": number, "digest": find_version(db, number).digest},
+        "database": {"path": db, "version": commit.number, "digest": commit.digest},
         "references": errors,
         "metrics": _metrics(case, simulation, reference),
         "outside_tables": outside,

@@ -138,7 +138,8 @@ def test_parity_of_plane_rows_follows_from_the_mirrored_plane():
 
 
 def _vehicle_for(term_set, term):
-    vehicle = load_vehicle("bb2")
+    boats = [load_vehicle(name) for name in ("bb2", "suboff")]
+    vehicle = next(v for v in boats if term.part == "section" or term.part in v.part_names())
     kind = "derivatives" if term.group == "added mass" else "sections"
     return vehicle.model_copy(update={"term_set": term_set, "added_mass": kind})
 
