@@ -28,6 +28,7 @@ def turn_sign(term: Term, frame: Frame) -> int:
     sign = int(frame.sign(term.output))
     for factor in term.factors:
         bare = factor[4:-1] if factor.startswith("sgn(") else factor
+        bare = bare.removesuffix("/U")
         sign *= 1 if factor.startswith("|") or factor == "deflection" else int(frame.sign(bare))
     return sign
 
