@@ -153,7 +153,10 @@ def _side_by_side(
             continue
         time, value, unit = series[angle]
         value = in_radians(value, unit)
-        turn = series[rate][:2] if rate and rate in series else None
+        turn = None
+        if rate and rate in series:
+            turn_time, turn_value, turn_unit = series[rate]
+            turn = (turn_time, in_radians(turn_value, turn_unit))
         label = "published_model" if case.reference and source == case.reference.published_model else str(source)
         columns[label] = measure(time, value, turn) if rate else measure(time, value)
     return {k: {label: column.get(k) for label, column in columns.items()} for k in columns["simulated"]}
