@@ -209,6 +209,8 @@ def without_inertia(runs: pd.DataFrame, header: CampaignFile, frame: Frame) -> p
     moment = angular @ tensor + np.cross(rates, rates @ tensor) + np.cross(np.broadcast_to(arm, force.shape), force)
     out = runs.copy()
     for output, own in zip(OUTPUTS, np.hstack([force, moment]).T, strict=True):
+        # A relative error is one of what the balance measured, inertia included.
+        out[f"size_{output}"] = out[output].abs().where(chosen)
         out[output] = out[output] + np.where(chosen, own, 0.0)
     return out
 
@@ -239,7 +241,7 @@ def whole_model(runs: pd.DataFrame, header: CampaignFile) -> pd.DataFrame:
             raise InputError(place, f"{run[name]:g}", f"zero: a half model ({plane}) is tested in symmetric flow")
     for output in OUTPUTS:
         keep = 2.0 if output in _DOUBLED[plane] else np.nan
-        for column in (output, f"s_{output}"):
+        for column in (output, f"s_{output}", f"size_{output}"):
             if column in out:
                 out[column] = out[column] * keep
     return out
@@ -250,7 +252,7 @@ def to_full_scale(runs: pd.DataFrame, ratio: float) -> pd.DataFrame:
     powers: dict[str, float] = {"U": 0.5, "D0": 1, "R0": 1, "n": -0.5, "x": 1, "y": 1, "z": 1}
     powers |= dict.fromkeys(("p", "q", "r"), -0.5) | dict.fromkeys(("pdot", "qdot", "rdot"), -1)
     powers |= {o: 3 if o in "XYZ" else 4 for o in OUTPUTS}
-    powers |= {f"s_{o}": powers[o] for o in OUTPUTS}
+    powers |= {f"{kind}_{o}": powers[o] for o in OUTPUTS for kind in ("s", "size")}
     scaled = runs.copy()
     for name, power in powers.items():
         if name in scaled:
@@ -262,7 +264,8 @@ def standard_errors(runs: pd.DataFrame, header: CampaignFile, length: float) -> 
     """Add s_X..s_N and s_KT, s_KQ, s_t by the campaign's rule.
 
     A standard error that the file gives stands. One that a reduction found is of the mean
-    alone; where the run also has ``rel_sigma``, the two are added in squares.
+    alone; where the run also has ``rel_sigma``, the two are added in squares. ``rel_sigma``
+    is relative to the load as measured, before the model's own inertia is taken off.
     """
     out = runs.copy()
     quality = out["quality"].map({k: q.factor for k, q in header.quality.items()}).astype(float)
@@ -276,7 +279,7 @@ def standard_errors(runs: pd.DataFrame, header: CampaignFile, length: float) -> 
     dynamic = out["U"].fillna(0.0) ** 2 + rate2 * length**2
     reduced = out["reduction"] != ""
     for name in (*OUTPUTS, *DIRECT):
-        size = out[name].abs()
+        size = np.fmax(out[name].abs(), out[f"size_{name}"]) if f"size_{name}" in out else out[name].abs()
         prime = (size / dynamic).where(dynamic > 0) if name in OUTPUTS else size
         worst = prime.groupby([out["test"], out["part"], kind]).transform("max").fillna(0.0)
         floor = header.uncertainty.floor * worst * (dynamic if name in OUTPUTS else 1.0)
