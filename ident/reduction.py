@@ -41,6 +41,8 @@ _WILDER = 2.0
 # trend over the window, in standard errors of the mean and as a share of the scatter.
 _EFFECTIVE = 20.0
 _TREND = 3.0
+# A channel whose whole range is below this share of the largest force or moment has settled.
+_SETTLED = 1e-3
 
 
 class Condensed:
@@ -296,6 +298,27 @@ def _trend(residual: Array, time: Array, effective: float) -> float:
     return abs(slope) / inflated if inflated > 0.0 else 0.0
 
 
+def _verdict(residuals: Array, time: Array, effective: Array, loads: list[str], values: Array, late: bool) -> list[str]:
+    """What speaks against convergence; channels that have settled are not asked."""
+    groups = ("XYZ", "KMN")
+    largest = {g: max((np.abs(values[:, c]).max() for c, q in enumerate(loads) if q in g), default=0.0) for g in groups}
+    words = []
+    unsettled = False
+    for c, name in enumerate(loads):
+        group = next((g for g in groups if name in g), "")
+        size = largest[group] if group else np.abs(values[:, c]).max()
+        if np.ptp(residuals[:, c]) <= _SETTLED * size:
+            continue
+        unsettled = True
+        if effective[c] < _EFFECTIVE:
+            words.append(f"{name}: {effective[c]:.0f} effective samples, {_EFFECTIVE:.0f} wanted")
+        elif _trend(residuals[:, c], time, effective[c]) > _TREND:
+            words.append(f"{name}: a trend is left")
+    if late and unsettled:
+        words.append("still in the start-up transient at half of the record")
+    return words
+
+
 def fit_history(condensed: Condensed, loads: list[str], transient: bool = True) -> Fitted:
     """Fit a condensed history.
 
@@ -324,15 +347,7 @@ def fit_history(condensed: Condensed, loads: list[str], transient: bool = True) 
     residuals[:, np.abs(residuals).max(axis=0) <= 1e-13 * np.abs(ys).max(axis=0)] = 0.0
     found = [_covariance(xs, residuals[:, c], w) for c in range(y.shape[1])]
     effective = np.array([e for _, e in found])
-    scatter = residuals.std(axis=0) > 0.0
-    words = []
-    for c, name in enumerate(loads):
-        if scatter[c] and effective[c] < _EFFECTIVE:
-            words.append(f"{name}: {effective[c]:.0f} effective samples, {_EFFECTIVE:.0f} wanted")
-        elif scatter[c] and _trend(residuals[:, c], t, effective[c]) > _TREND:
-            words.append(f"{name}: a trend is left")
-    if cut and cut >= int(_SHARE * n) - max(1, n // _CUTS):
-        words.append("still in the start-up transient at half of the record")
+    words = _verdict(residuals, t, effective, loads, ys, cut >= int(_SHARE * n) - max(1, n // _CUTS) > 0)
     # The constant is the first regressor of every fit, averaged to one.
     values[0] += centre
     return Fitted(
