@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ident import reduction
+from ident import condense, reduction
 from ident.quantities import HARMONICS
 from ident.readers.source import MOTIONS, Reduction
 from sim.catalogue import OUTPUTS
@@ -128,8 +128,8 @@ def reduce(channels: Channels, rule: Reduction, run_id: str, frequency: float | 
     if "time" not in channels.quantities and rule.rate_hz is None:
         text = "a column time, or rate_hz in [source.reduction]"
         raise InputError(str(channels.path), "no time", text)
-    regressors = _regressors(channels, rule, frequency)
-    condensed = reduction.condense(_timed(channels, rule), regressors, len(names))
+    regressors, span = _regressors(channels, rule, frequency)
+    condensed = condense.condense(_timed(channels, rule), regressors, len(names))
     try:
         fit = reduction.fit_history(condensed, names)
     except (ValueError, np.linalg.LinAlgError) as error:
@@ -144,23 +144,26 @@ def reduce(channels: Channels, rule: Reduction, run_id: str, frequency: float | 
         values[name] = float(fit.values[0, c])
         if name in OUTPUTS:
             values[f"s_{name}"] = math.sqrt(max(float(fit.covariance[c, 0, 0]), 0.0))
+    if rule.kind == "acceleration" and "U" in names:
+        values["udot"] = float(fit.values[1, names.index("U")]) / span
     return values, reduced
 
 
-def _regressors(channels: Channels, rule: Reduction, frequency: float | None) -> Callable[[Array], Array]:
-    """What the channels of a test are fitted by."""
+def _regressors(channels: Channels, rule: Reduction, frequency: float | None) -> tuple[condense.Regressors, float]:
+    """What the channels of a test are fitted by, and the unit of its time [s]."""
     if rule.kind == "steady":
-        return reduction.constant
+        return condense.constant, 1.0
     if rule.kind == "oscillatory":
         if not frequency:
             raise InputError(str(channels.path), "no frequency", "frequency_hz in [source.reduction], or frequency")
-        return reduction.harmonics(frequency, math.radians(rule.phase_deg))
+        return condense.harmonics(frequency, math.radians(rule.phase_deg)), 1.0
     first, last = math.inf, -math.inf
     for time, _ in _timed(channels, rule):
         first, last = min(first, float(time[0])), float(time[-1])
     if not last > first:
         raise InputError(str(channels.path), "no span of time", "samples over a span of time")
-    return reduction.powers(0.5 * (first + last), 0.5 * (last - first))
+    half = 0.5 * (last - first)
+    return condense.powers(first + half, half), half
 
 
 def _harmonic_values(names: list[str], fit: reduction.Fitted, frequency: float, phase: float) -> dict[str, Any]:

@@ -1,8 +1,4 @@
-"""Time histories to values with standard errors, in bounded memory.
-
-A history is condensed while it is read: consecutive samples are averaged into at most
-``_MOST`` blocks, and the regressors (one; harmonics; powers of time) are averaged over the
-same blocks, so that the least-squares fit of block means is unbiased whatever their length.
+"""Condensed time histories to values with standard errors.
 
 * **Start-up transient**: MSER (White 1997) on the residuals of the fit. The cut d minimises
   SSE(d) / (n - d)^2 over the first half; for a mean this is the rule as published. The cut
@@ -17,18 +13,19 @@ same blocks, so that the least-squares fit of block means is unbiased whatever t
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+
+from ident.condense import Condensed
+from ident.regression import least_squares
 
 Array = NDArray[np.float64]
 
 TRANSIENT = "MSER"
 ERROR = "autoregressive (Burg, AICc)"
 
-_MOST = 1 << 15
 _FEWEST = 8
 # Cuts tried, the share of the record that may be cut, and the longest autoregression.
 _CUTS = 200
@@ -41,79 +38,8 @@ _WILDER = 2.0
 # trend over the window, in standard errors of the mean and as a share of the scatter.
 _EFFECTIVE = 20.0
 _TREND = 3.0
-
-
-class Condensed:
-    """Block means of samples that are fed in pieces.
-
-    Parameters
-    ----------
-    regressors : Times (n,) -> (n, p) columns to be averaged with the samples.
-    channels : Number of channels of a sample, time left out.
-    most : Blocks to keep; the block length doubles when they are full.
-    """
-
-    def __init__(self, regressors: Callable[[Array], Array], channels: int, most: int = _MOST) -> None:
-        self.regressors = regressors
-        self.p = regressors(np.zeros(1)).shape[1]
-        self.most = most
-        self.length = 1
-        self.samples = 0
-        # Columns: weight, then weighted time, regressors and channels.
-        self._full = np.zeros((0, 2 + self.p + channels))
-        self._rest = np.zeros((0, 2 + self.p + channels))
-        self._last: float | None = None
-        self._alone: tuple[Array, Array] | None = None
-
-    def add(self, time: Array, values: Array) -> None:
-        """Take in some samples.
-
-        Parameters
-        ----------
-        time : (n,) rising, [s].
-        values : (n, channels).
-        """
-        if self._alone is not None:
-            time, values = np.append(self._alone[0], time), np.vstack([self._alone[1], values])
-            self._alone = None
-        if not time.size:
-            return
-        if self._last is None and time.size == 1:
-            # The first step is not known before the second sample.
-            self._alone = (time, values)
-            return
-        self.samples += time.size
-        # A sample stands for the step that ends in it, so uneven steps weigh as they last.
-        step = np.diff(time, prepend=time[0] if self._last is None else self._last)
-        if self._last is None:
-            step[0] = step[1]
-        self._last = float(time[-1])
-        sample = np.column_stack([time, self.regressors(time), values])
-        rows = np.column_stack([step, step[:, None] * sample])
-        self._rest = np.vstack([self._rest, rows])
-        n = len(self._rest) // self.length
-        if n:
-            whole = self._rest[: n * self.length].reshape(n, self.length, -1).sum(axis=1)
-            self._rest = self._rest[n * self.length :]
-            self._full = np.vstack([self._full, whole])
-        while len(self._full) > self.most:
-            pairs = len(self._full) // 2
-            odd = self._full[2 * pairs :]
-            self._full = self._full[: 2 * pairs].reshape(pairs, 2, -1).sum(axis=1)
-            self.length *= 2
-            if len(odd):
-                # The odd block goes back in front of the samples that follow it.
-                self._rest = np.vstack([self._split(odd, self.length // 2), self._rest])
-
-    @staticmethod
-    def _split(block: Array, parts: int) -> Array:
-        return np.repeat(block / parts, parts, axis=0)
-
-    def blocks(self) -> tuple[Array, Array, Array, Array]:
-        """Weights (n,), mean times (n,), regressors (n, p) and channels (n, channels)."""
-        weight = self._full[:, :1]
-        means = self._full[:, 1:] / weight
-        return self._full[:, 0], means[:, 0], means[:, 1 : 1 + self.p], means[:, 1 + self.p :]
+# A channel whose whole range is below this share of the largest force or moment has settled.
+_SETTLED = 1e-3
 
 
 @dataclass(frozen=True)
@@ -260,11 +186,10 @@ def autocovariance(a: Array, variance: float, lags: int) -> Array:
     return gamma
 
 
-def _covariance(x: Array, residual: Array, weight: Array) -> tuple[Array, float]:
+def _covariance(x: Array, residual: Array, weight: Array, inverse: Array) -> tuple[Array, float]:
     """Covariance of least-squares coefficients with autocorrelated errors; effective samples."""
     n, p = x.shape
     w = weight / weight.mean()
-    inverse = np.linalg.inv((x * w[:, None]).T @ x)
     scatter = float((w * residual**2).sum())
     if scatter <= 0.0:
         return np.zeros((p, p)), float(n)
@@ -296,6 +221,27 @@ def _trend(residual: Array, time: Array, effective: float) -> float:
     return abs(slope) / inflated if inflated > 0.0 else 0.0
 
 
+def _verdict(residuals: Array, time: Array, effective: Array, loads: list[str], values: Array, late: bool) -> list[str]:
+    """What speaks against convergence; channels that have settled are not asked."""
+    groups = ("XYZ", "KMN")
+    largest = {g: max((np.abs(values[:, c]).max() for c, q in enumerate(loads) if q in g), default=0.0) for g in groups}
+    words = []
+    unsettled = False
+    for c, name in enumerate(loads):
+        group = next((g for g in groups if name in g), "")
+        size = largest[group] if group else np.abs(values[:, c]).max()
+        if np.ptp(residuals[:, c]) <= _SETTLED * size:
+            continue
+        unsettled = True
+        if effective[c] < _EFFECTIVE:
+            words.append(f"{name}: {effective[c]:.0f} effective samples, {_EFFECTIVE:.0f} wanted")
+        elif _trend(residuals[:, c], time, effective[c]) > _TREND:
+            words.append(f"{name}: a trend is left")
+    if late and unsettled:
+        words.append("still in the start-up transient at half of the record")
+    return words
+
+
 def fit_history(condensed: Condensed, loads: list[str], transient: bool = True) -> Fitted:
     """Fit a condensed history.
 
@@ -317,22 +263,13 @@ def fit_history(condensed: Condensed, loads: list[str], transient: bool = True) 
     centre = y.mean(axis=0)
     cut = mser(x, y - centre, weight) if transient else 0
     w, t, xs, ys = weight[cut:], time[cut:], x[cut:], y[cut:]
-    root = np.sqrt(w / w.mean())
-    values = np.linalg.lstsq(xs * root[:, None], (ys - centre) * root[:, None], rcond=None)[0]
+    values, inverse = least_squares(xs, ys - centre, w / w.mean())
     residuals = ys - centre - xs @ values
     # Scatter at the level of rounding is none.
     residuals[:, np.abs(residuals).max(axis=0) <= 1e-13 * np.abs(ys).max(axis=0)] = 0.0
-    found = [_covariance(xs, residuals[:, c], w) for c in range(y.shape[1])]
+    found = [_covariance(xs, residuals[:, c], w, inverse) for c in range(y.shape[1])]
     effective = np.array([e for _, e in found])
-    scatter = residuals.std(axis=0) > 0.0
-    words = []
-    for c, name in enumerate(loads):
-        if scatter[c] and effective[c] < _EFFECTIVE:
-            words.append(f"{name}: {effective[c]:.0f} effective samples, {_EFFECTIVE:.0f} wanted")
-        elif scatter[c] and _trend(residuals[:, c], t, effective[c]) > _TREND:
-            words.append(f"{name}: a trend is left")
-    if cut and cut >= int(_SHARE * n) - max(1, n // _CUTS):
-        words.append("still in the start-up transient at half of the record")
+    words = _verdict(residuals, t, effective, loads, ys, cut >= int(_SHARE * n) - max(1, n // _CUTS) > 0)
     # The constant is the first regressor of every fit, averaged to one.
     values[0] += centre
     return Fitted(
@@ -348,43 +285,3 @@ def fit_history(condensed: Condensed, loads: list[str], transient: bool = True) 
         y,
         x @ values,
     )
-
-
-def constant(time: Array) -> Array:
-    """Regressor of a steady test."""
-    return np.ones((time.size, 1))
-
-
-def harmonics(frequency: float, phase: float = 0.0) -> Callable[[Array], Array]:
-    """Regressors 1, sin, cos, sin 2, cos 2, sin 3, cos 3 of 2 pi f t + phase.
-
-    Parameters
-    ----------
-    frequency : f [Hz].
-    phase : of the displacement at time zero [rad].
-    """
-
-    def regressors(time: Array) -> Array:
-        angle = 2.0 * math.pi * frequency * time + phase
-        columns = [f(k * angle) for k in (1, 2, 3) for f in (np.sin, np.cos)]
-        return np.column_stack([np.ones(time.size), *columns])
-
-    return regressors
-
-
-def powers(middle: float, span: float) -> Callable[[Array], Array]:
-    """Regressors 1, tau, tau^2 with tau = (t - middle) / span, for constant acceleration."""
-
-    def regressors(time: Array) -> Array:
-        tau = (time - middle) / span
-        return np.column_stack([np.ones(time.size), tau, tau**2])
-
-    return regressors
-
-
-def condense(chunks: Iterator[tuple[Array, Array]], regressors: Callable[[Array], Array], channels: int) -> Condensed:
-    """Feed all (time, values) pieces of a history into block means."""
-    condensed = Condensed(regressors, channels)
-    for time, values in chunks:
-        condensed.add(time, values)
-    return condensed

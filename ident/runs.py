@@ -198,7 +198,7 @@ def _from_histories(
                 raise InputError(str(channels.path), found, "one of the two")
         run = {**dict.fromkeys(TEXT, ""), "source": f"{path.name}, reduced", **own, **numbers, **values}
         run |= {"file": path.name, "row": 1, "reduction": one.words(), "converged": one.fit.converged}
-        rows += states(run, rule, frame, ittc, str(path)) if rule.kind == "oscillatory" else [_mid_run(run, one, rule)]
+        rows += states(run, rule, frame, ittc, str(path)) if rule.kind == "oscillatory" else [run]
         reduced.append(one)
     out = pd.DataFrame(rows)
     for name in REQUIRED:
@@ -206,14 +206,6 @@ def _from_histories(
         if missing.any():
             raise InputError(str(path), f"{name} missing", f"{name} in [source.constants], or (?P<{name}>...) in match")
     return out, reduced
-
-
-def _mid_run(run: dict[str, Any], one: Reduced, rule: Any) -> dict[str, Any]:
-    """A constant acceleration with a measured speed: its slope is the acceleration."""
-    if rule.kind == "acceleration" and "U" in one.loads:
-        half = 0.5 * (one.fit.time[-1] - one.fit.time[0])
-        run["udot"] = float(one.fit.values[1, one.loads.index("U")]) / half if half > 0 else np.nan
-    return run
 
 
 def _channels(
