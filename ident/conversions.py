@@ -279,7 +279,9 @@ def standard_errors(runs: pd.DataFrame, header: CampaignFile, length: float) -> 
     dynamic = out["U"].fillna(0.0) ** 2 + rate2 * length**2
     reduced = out["reduction"] != ""
     for name in (*OUTPUTS, *DIRECT):
-        size = np.fmax(out[name].abs(), out[f"size_{name}"]) if f"size_{name}" in out else out[name].abs()
+        size = out[name].abs()
+        if f"size_{name}" in out:
+            size = size.where(out[f"size_{name}"].isna(), out[f"size_{name}"])
         prime = (size / dynamic).where(dynamic > 0) if name in OUTPUTS else size
         worst = prime.groupby([out["test"], out["part"], kind]).transform("max").fillna(0.0)
         floor = header.uncertainty.floor * worst * (dynamic if name in OUTPUTS else 1.0)
