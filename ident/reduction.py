@@ -113,7 +113,7 @@ def _departs(x: Array, y: Array, w: Array, cut: int, fit: Array) -> bool:
     residual = y - x @ fit
     before, after = residual[:cut], residual[cut:]
     scatter = float((w[cut:] * after**2).sum()) / max(after.size - x.shape[1], 1)
-    if math.sqrt(float((before**2).mean())) > _WILDER * math.sqrt(scatter):
+    if float((before**2).mean()) > _WILDER**2 * (1.0 + _WILDER**2 / cut) * scatter:
         return True
     gamma = autocovariance(*burg(after - after.mean()), cut)
     if gamma[0] <= 0.0:

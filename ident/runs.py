@@ -46,15 +46,16 @@ def source_runs(folder: Path, source: Source, header: CampaignFile) -> tuple[pd.
         Naming file, row, column, what was found and what is allowed.
     """
     paths = matching(folder, source)
+    where = str(folder / "campaign.toml")
     tables: list[pd.DataFrame] = []
     reduced: list[Reduced] = []
     for path in paths:
         stated = constants(folder, path, source)
         if source.rows == "history":
-            table, found = _from_histories(path, source, header, stated)
+            table, found = _from_histories(path, source, header, stated, where)
             reduced += found
         else:
-            table = _from_table(path, source, header, stated)
+            table = _from_table(path, source, header, stated, where)
         tables.append(table)
     return pd.concat(tables, ignore_index=True), reduced, paths
 
@@ -106,7 +107,7 @@ def constants(folder: Path, path: Path, source: Source) -> tuple[dict[str, str],
 Stated = tuple[dict[str, str], dict[str, float], set[str]]
 
 
-def _from_table(path: Path, source: Source, header: CampaignFile, stated: Stated) -> pd.DataFrame:
+def _from_table(path: Path, source: Source, header: CampaignFile, stated: Stated, where: str) -> pd.DataFrame:
     """A table with a row a run."""
     words, numbers, primed = stated
     sheet = open_sheet(path, source)
@@ -128,15 +129,16 @@ def _from_table(path: Path, source: Source, header: CampaignFile, stated: Stated
     _required(sheet, columns, source)
     if "run_id" not in columns:
         columns["run_id"] = [f"{path.stem}-{row}" for row in rows]
+    columns.setdefault("source", path.name)
     for name in TEXT:
         columns.setdefault(name, "")
     out = pd.DataFrame({**columns, "file": path.name, "row": rows, "reduction": ""}, index=range(len(rows)))
-    out = dimensional(out, primed, source.normalisation, header, str(path.parent / "campaign.toml"))
+    out = dimensional(out, primed, source.normalisation, header, where)
     return _spread(out, source, header, str(path)) if source.reduction else out
 
 
 def _required(sheet: Sheet, columns: dict[str, Any], source: Source) -> None:
-    optional = {"run_id"} if source.columns or source.constants else set()
+    optional = {"run_id", "source"} if source.columns or source.constants else set()
     optional |= {"test"} if source.reduction else set()
     for name in REQUIRED:
         if name not in columns and name not in optional:
@@ -172,12 +174,11 @@ def _spread(table: pd.DataFrame, source: Source, header: CampaignFile, where: st
 
 
 def _from_histories(
-    path: Path, source: Source, header: CampaignFile, stated: Stated
+    path: Path, source: Source, header: CampaignFile, stated: Stated, where: str
 ) -> tuple[pd.DataFrame, list[Reduced]]:
     """A file or case that is one history a part."""
     assert source.reduction is not None
     words, numbers, primed = stated
-    where = str(path.parent / "campaign.toml")
     rule = source.reduction
     if primed:
         one_run = pd.DataFrame([{**numbers, "file": path.name, "row": 1}])
@@ -186,7 +187,7 @@ def _from_histories(
     frame, ittc = header.frame.frame, header.frame.angles == "ittc"
     rows: list[dict[str, Any]] = []
     reduced = []
-    for part, channels in _channels(path, source, header, numbers):
+    for part, channels in _channels(path, source, header, numbers, where):
         own = dict(words) | ({"part": part} if part else {})
         name = own.get("run_id") or path.stem
         own["run_id"] = f"{name}-{part}" if part else name
@@ -209,11 +210,11 @@ def _from_histories(
 
 
 def _channels(
-    path: Path, source: Source, header: CampaignFile, numbers: dict[str, float]
+    path: Path, source: Source, header: CampaignFile, numbers: dict[str, float], where: str
 ) -> Iterator[tuple[str, Channels]]:
     """The histories of a path: part (empty where the campaign names it) and channels."""
     if reader_of(path, source) == "openfoam":
-        yield from _openfoam(path, source, header)
+        yield from _openfoam(path, source, header, where)
         return
     sheet = open_sheet(path, source)
     wanted = [(i, k) for i, k in enumerate(columns_of(sheet, source, ())) if k is not None]
@@ -222,7 +223,6 @@ def _channels(
     names = [k.quantity for _, k in wanted]
     primed = {k.quantity for _, k in wanted if k.primed}
     one = pd.DataFrame([{**dict.fromkeys(names, 1.0), "U": numbers.get("U"), "file": path.name, "row": 1}])
-    where = str(path.parent / "campaign.toml")
     scales = dimensional(one, primed, source.normalisation, header, where).iloc[0]
     factors = np.array([float(scales[k.quantity]) if k.primed else k.factor for _, k in wanted])
 
@@ -233,12 +233,11 @@ def _channels(
     yield "", Channels(path, names, pieces)
 
 
-def _openfoam(path: Path, source: Source, header: CampaignFile) -> Iterator[tuple[str, Channels]]:
+def _openfoam(path: Path, source: Source, header: CampaignFile, where: str) -> Iterator[tuple[str, Channels]]:
     """The function objects of an OpenFOAM case, each the history of one part."""
-    place = f"{path.parent / 'campaign.toml'}, key source.rho_inf"
     if source.rho_inf is None:
         text = "the rhoInf of the function object: 1 for kinematic loads, or the density it used"
-        raise InputError(place, "nothing", text)
+        raise InputError(f"{where}, key source.rho_inf", "nothing", text)
     if not path.is_dir():
         raise InputError(str(path), "a file", "a case folder, its postProcessing, or one function object in it")
     try:

@@ -58,6 +58,8 @@ def reader_of(path: Path, source: Source) -> str:
     first = next(iter(head(path, source.encoding, ("#", "%", "!")).text), "")
     if source.patterns or re.search(r"\bMonitor\b", first):
         return "starccm"
+    if first and not re.search(r"[A-Za-z]", re.sub(r"[eEdD][+-]?\d", "", first)):
+        return "columns"
     delimited = any(mark in first for mark in ",;\t")
     return "table" if delimited or path.suffix == ".csv" else "columns"
 

@@ -260,7 +260,7 @@ def columns_of(sheet: Sheet, source: Source, text: tuple[str, ...]) -> list[Colu
 
 def _by_pattern(sheet: Sheet, source: Source) -> dict[str, str]:
     """Header -> declared quantity, by the regular expressions of ``patterns``."""
-    if source.reader == "starccm" and not source.patterns:
+    if not (source.patterns or source.columns) and any(re.search(r"\bMonitor\b", h) for h in sheet.header):
         text = "a table [source.patterns] that names the monitors, see docs/readers.md"
         raise InputError(sheet.where, "monitors without names", text)
     found: dict[str, str] = {}

@@ -87,15 +87,14 @@ def blocks(path: Path, encoding: str = "utf-8", comments: tuple[str, ...] = COMM
     row, rest = 1, ""
     for text in itertools.chain(_decoded(path, encoding), [None]):
         if text is not None:
-            found = (rest + text).replace("\r\n", "\n").split("\n")
-            rest = found.pop()
-            if "\r" in rest and not rest.endswith("\r"):
-                # Files of old Macintosh programs end their lines in \r alone.
-                more = rest.split("\r")
-                rest = more.pop()
-                found += more
+            # A lone carriage return at the end may be half of a line end.
+            whole = rest + text
+            half = "\r" if whole.endswith("\r") else ""
+            found = whole.removesuffix("\r").replace("\r\n", "\n").replace("\r", "\n").split("\n")
+            rest = found.pop() + half
         else:
-            found = [rest] if rest else []
+            found = [rest.removesuffix("\r")] if rest.strip() else []
+            rest = ""
         if len(rest) > _LONGEST or any(len(line) > _LONGEST for line in found):
             raise InputError(
                 f"{path}, row {row} or after", f"a line of more than {_LONGEST} characters", "shorter lines"
@@ -105,7 +104,7 @@ def blocks(path: Path, encoding: str = "utf-8", comments: tuple[str, ...] = COMM
         ]
         row += len(found)
         if kept:
-            yield Lines([r for r, _ in kept], [line.rstrip("\r") for _, line in kept])
+            yield Lines([r for r, _ in kept], [line for _, line in kept])
 
 
 def head(path: Path, encoding: str = "utf-8", comments: tuple[str, ...] = ()) -> Lines:
