@@ -14,8 +14,10 @@ from click.testing import CliRunner
 
 from ident.campaign import read_campaign
 from ident.cli import main
+from ident.derivatives import checks
 from ident.fit import fit
 from ident.identify import identify
+from ident.report import write_report
 from ident.stability import stability
 from ident.store import commit, database_rows
 from sim.case import load_case
@@ -96,6 +98,21 @@ def test_derivatives_by_axisymmetry_are_the_vertical_ones_turned(printed):
     signs = {"Y_vdot": 1, "N_vdot": -1, "Y_rdot": -1, "N_rdot": 1, "Y_deltar": -1, "N_deltar": 1}
     for horizontal, vertical in pairs.items():
         assert printed[horizontal] == signs[horizontal] * printed[vertical], horizontal
+
+
+def test_neighbour_in_the_sign_checks_is_this_boat(printed):
+    for check in checks():
+        if check.suboff is not None:
+            output, motion = check.symbol.split("_")
+            name = f"{output}_u{motion}" if motion in "qr" else check.symbol
+            assert check.suboff == printed[name], name
+
+
+def test_report_shows_the_published_derivatives_as_its_own(both, tmp_path):
+    """Slopes of the assembled model, beside the print: the ratio is one."""
+    page = write_report(both, None, tmp_path, "suboff").read_text("utf-8")
+    assert page.count("given by the source as a coefficient, not by runs") == 25
+    assert page.count("-0.027834") >= 3
 
 
 # -- stability -------------------------------------------------------------------------------
