@@ -189,8 +189,14 @@ def _harmonic_values(names: list[str], fit: reduction.Fitted, frequency: float, 
 
 
 def phase_row(theta: float) -> Array:
-    """Weights of mean, in, out, in2, out2, in3, out3 in the load at phase ``theta``."""
-    return np.array([1.0, *(f(k * theta) for k in (1, 2, 3) for f in (math.sin, math.cos))])
+    """Weights of mean, in, out, in2, out2, in3, out3 in the load at phase ``theta``.
+
+    The third harmonic in phase is left out: a load that is a function of the velocity and
+    linear in the acceleration has none, so at the ends of the acceleration it is noise.
+    """
+    row = np.array([1.0, *(f(k * theta) for k in (1, 2, 3) for f in (math.sin, math.cos))])
+    row[HARMONICS.index("in3")] = 0.0
+    return row
 
 
 def states(run: dict[str, Any], rule: Reduction, frame: Frame, ittc: bool, where: str) -> list[dict[str, Any]]:

@@ -5,7 +5,7 @@
   is made only where what it takes off departs from the rest (Geweke 1992): by more than
   three standard errors in the mean, or twice the scatter. Else it would cost data for noise.
 * **Standard error**: the residuals' autocovariance is that of an autoregression fitted by
-  Burg's method, its order by AICc; with it, cov(b) = (X'X)^-1 X' G X (X'X)^-1. For a mean
+  Burg's method, its order by Schwarz's criterion; with it, cov(b) = (X'X)^-1 X' G X (X'X)^-1. For a mean
   this is the spectrum at zero over n (Heidelberger and Welch 1981; ``spectrum0.ar``).
 * **Verdict**: enough effectively independent samples, no trend left, cut inside the half.
 """
@@ -24,7 +24,7 @@ from ident.regression import least_squares
 Array = NDArray[np.float64]
 
 TRANSIENT = "MSER"
-ERROR = "autoregressive (Burg, AICc)"
+ERROR = "autoregressive (Burg, SBC)"
 
 _FEWEST = 8
 # Cuts tried, the share of the record that may be cut, and the longest autoregression.
@@ -125,7 +125,7 @@ def _departs(x: Array, y: Array, w: Array, cut: int, fit: Array) -> bool:
 
 
 def burg(residual: Array, most: int = _ORDER) -> tuple[Array, float]:
-    """Autoregression of a series by Burg's method, order by the corrected Akaike criterion.
+    """Autoregression of a series by Burg's method, order by Schwarz's criterion.
 
     Parameters
     ----------
@@ -153,7 +153,7 @@ def burg(residual: Array, most: int = _ORDER) -> tuple[Array, float]:
             if variance <= 0.0:
                 break
             forward, backward = (forward - reflection * backward)[1:], (backward - reflection * forward)[:-1]
-        score = n * math.log(variance) + 2.0 * (k + 1) * n / (n - k - 2) if variance > 0.0 else math.inf
+        score = n * math.log(variance) + k * math.log(n) if variance > 0.0 else math.inf
         if score < best[0] - 1e-9:
             best = (score, a, variance)
     return best[1], best[2]
