@@ -11,7 +11,7 @@ from ident.validate import Validation, validate
 from sim.case import load_case
 from sim.database import find_version, own_version, read_rows
 from sim.errors import InputError
-from sim.vehicle import bundled
+from sim.vehicle import bundled, load_vehicle
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -43,6 +43,13 @@ def _flyable(names: list[str], present: set[str]) -> list[str]:
     if not found:
         raise InputError(f"vehicles {', '.join(sorted(present))}", "no case of them", "a folder of cases: --cases DIR")
     return found
+
+
+def _trained(db: str, name: str, number: int) -> list[str]:
+    """Names of the cases that the coefficients of a case's vehicle were trained on."""
+    case, where = load_case(name)
+    vehicle = load_vehicle(case.vehicle, beside=where)
+    return list(json.loads(own_version(db, vehicle.name, number).metadata.get("trained", "[]")))
 
 
 def _mean_ratio(cases: list[dict[str, Any]]) -> float | None:
@@ -85,9 +92,9 @@ def run_all(
     flown, cases = [], []
     for name in names:
         each(name)
+        trained = _trained(db, name, record.number)
         done = validate(name, db, record.number)
         flown.append(done)
-        trained = json.loads(own_version(db, done.vehicle.name, record.number).metadata.get("trained", "[]"))
         cases.append({**done.result, "trained": done.case.name in trained})
     board = {
         "database": {"path": db, "version": record.number, "digest": record.digest},
