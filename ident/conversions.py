@@ -159,7 +159,10 @@ def quantity_of(text: str, quantity: str, where: str) -> float:
 
 
 def move_moments(runs: pd.DataFrame, point: list[float]) -> pd.DataFrame:
-    """Moments about the origin: M_O = M_P + r_P x F. Missing moments stay missing."""
+    """Moments about the origin: M_O = M_P + r_P x F. Missing moments stay missing.
+
+    Standard errors of the forces are carried over as if independent of the moment's.
+    """
     x, y, z = point
     levers = {"K": {"Z": y, "Y": -z}, "M": {"X": z, "Z": -x}, "N": {"Y": x, "X": -y}}
     moved = runs.copy()
@@ -173,6 +176,9 @@ def move_moments(runs: pd.DataFrame, point: list[float]) -> pd.DataFrame:
                 place = f"{run['file']}, row {run['row']}, column {force}"
                 raise InputError(place, "nothing", f"a number: moving {moment} to the vehicle's origin needs {force}")
             moved[moment] = moved[moment] + arm * runs[force]
+            if f"s_{moment}" in moved and f"s_{force}" in moved:
+                own, carried = moved[f"s_{moment}"], arm * runs[f"s_{force}"].fillna(0.0)
+                moved[f"s_{moment}"] = (own**2 + carried**2) ** 0.5
     return moved
 
 

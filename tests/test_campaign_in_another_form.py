@@ -167,7 +167,7 @@ def test_dimensionless_loads_give_the_same_coefficients(tables, rows, tmp_path, 
 
 
 def test_left_handed_without_a_hand_is_refused():
-    with pytest.raises(FrameError, match="rotations"):
+    with pytest.raises(FrameError, match="by which hand"):
         Frame("forward", "starboard", "up")
     with pytest.raises(FrameError, match="left-hand"):
         Frame("forward", "starboard", "up", "both")
