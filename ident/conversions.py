@@ -58,7 +58,7 @@ def dimensional(runs: pd.DataFrame, primed: set[str], name: str, header: Campaig
     Parameters
     ----------
     runs : With U [m/s] in every run.
-    primed : Quantities that are dimensionless; their standard errors and harmonics too.
+    primed : Quantities that are dimensionless, ``s_X`` and ``X_in`` among them.
     name : A row of ``data/normalisations.csv``.
     header : For length, draught and density.
     where : For the error.
@@ -93,9 +93,7 @@ def dimensional(runs: pd.DataFrame, primed: set[str], name: str, header: Campaig
         scale = _product(str(forms[kind]), values)
         if own in OUTPUTS:
             scale = scale * 0.5 * header.fluid.density_kgpm3 * speed**2
-        for column in (quantity, f"s_{quantity}"):
-            if column in out and (column == quantity or column not in primed):
-                out[column] = out[column] * scale
+        out[quantity] = out[quantity] * scale
     return out
 
 
