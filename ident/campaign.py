@@ -181,6 +181,7 @@ def read_campaign(folder: Path) -> Campaign:
     where = str(folder / "campaign.toml")
     vehicle = load_vehicle(header.vehicle, beside=folder / "campaign.toml")
     frame = header.frame.declared(f"{where}, [frame]")
+    _check_named(header, vehicle, where)
     runs, reduced, paths = read_runs(folder, header, vehicle)
     digests = {"campaign.toml": hashlib.sha256(raw).hexdigest()}
     for path in sorted({f for p in paths for f in inputs(p)}):
@@ -199,6 +200,17 @@ def read_campaign(folder: Path) -> Campaign:
         place = f"{folder / run['file']}, row {run['row']}"
         raise InputError(place, "a load that is not finite at full scale", "smaller numbers")
     return Campaign(header, vehicle, runs, digests, tuple(reduced))
+
+
+def _check_named(header: CampaignFile, vehicle: Vehicle, where: str) -> None:
+    """Tests and parts that ``[inertia]`` and ``[[tare]]`` name exist: a slip would take nothing off."""
+    known = {"tests": list(tests().index), "parts": vehicle.part_names()}
+    named = [("inertia", "parts", header.inertia.parts if header.inertia.model_inertia_in_loads else [])]
+    named += [(f"tare.{k}", key, getattr(tare, key)) for k, tare in enumerate(header.tare) for key in known]
+    for table, key, words in named:
+        for word in words:
+            if word not in known[key]:
+                raise InputError(f"{where}, key {table}.{key}", repr(word), ", ".join(known[key]))
 
 
 def _in_program_frame(runs: pd.DataFrame, header: CampaignFile, frame: Frame, where: str) -> pd.DataFrame:

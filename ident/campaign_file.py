@@ -11,7 +11,7 @@ from pydantic import Field, field_validator, model_validator
 from ident.readers.source import Source, Vector
 from sim.catalogue import OUTPUTS
 from sim.errors import InputError
-from sim.frames import Frame
+from sim.frames import Frame, FrameError
 from sim.schema import Data, FrameData, checked
 
 
@@ -33,6 +33,14 @@ class CampaignFrame(FrameData):
     def frame(self) -> Frame:
         """The declared frame. Raises ``FrameError`` when it is not one."""
         return Frame(self.x, self.y, self.z, self.rotations)
+
+    def declared(self, where: str) -> Frame:
+        """The declared frame. Raises ``InputError`` naming ``where`` when it is not one."""
+        try:
+            return self.frame
+        except FrameError as error:
+            text = 'right-handed axes; or left-handed ones with rotations = "left-hand" (N = x Y - y X) or "right-hand"'
+            raise InputError(where, str(error), text) from error
 
 
 class MomentPoint(Data):

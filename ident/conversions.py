@@ -58,7 +58,7 @@ def dimensional(runs: pd.DataFrame, primed: set[str], name: str, header: Campaig
     Parameters
     ----------
     runs : With U [m/s] in every run.
-    primed : Quantities that are dimensionless; their standard errors and harmonics too.
+    primed : Quantities that are dimensionless, ``s_X`` and ``X_in`` among them.
     name : A row of ``data/normalisations.csv``.
     header : For length, draught and density.
     where : For the error.
@@ -93,9 +93,7 @@ def dimensional(runs: pd.DataFrame, primed: set[str], name: str, header: Campaig
         scale = _product(str(forms[kind]), values)
         if own in OUTPUTS:
             scale = scale * 0.5 * header.fluid.density_kgpm3 * speed**2
-        for column in (quantity, f"s_{quantity}"):
-            if column in out and (column == quantity or column not in primed):
-                out[column] = out[column] * scale
+        out[quantity] = out[quantity] * scale
     return out
 
 
@@ -159,7 +157,10 @@ def quantity_of(text: str, quantity: str, where: str) -> float:
 
 
 def move_moments(runs: pd.DataFrame, point: list[float]) -> pd.DataFrame:
-    """Moments about the origin: M_O = M_P + r_P x F. Missing moments stay missing."""
+    """Moments about the origin: M_O = M_P + r_P x F. Missing moments stay missing.
+
+    Standard errors of the forces are carried over as if independent of the moment's.
+    """
     x, y, z = point
     levers = {"K": {"Z": y, "Y": -z}, "M": {"X": z, "Z": -x}, "N": {"Y": x, "X": -y}}
     moved = runs.copy()
@@ -173,6 +174,9 @@ def move_moments(runs: pd.DataFrame, point: list[float]) -> pd.DataFrame:
                 place = f"{run['file']}, row {run['row']}, column {force}"
                 raise InputError(place, "nothing", f"a number: moving {moment} to the vehicle's origin needs {force}")
             moved[moment] = moved[moment] + arm * runs[force]
+            if f"s_{moment}" in moved and f"s_{force}" in moved:
+                own, carried = moved[f"s_{moment}"], arm * runs[f"s_{force}"].fillna(0.0)
+                moved[f"s_{moment}"] = (own**2 + carried**2) ** 0.5
     return moved
 
 

@@ -245,9 +245,10 @@ def _openfoam(path: Path, source: Source, header: CampaignFile, where: str) -> I
     except OSError as error:
         raise InputError(str(path), f"cannot be read: {error.strerror}", "a readable folder") from error
     if not found:
-        raise InputError(
-            str(path), "no output of forces", "postProcessing/<function object>/<start>/forces.dat or force.dat"
-        )
+        others = sorted({p.name for p in path.glob("**/*.dat")})[:5]
+        seen = f", only {', '.join(others)}" if others else ""
+        text = "postProcessing/<function object>/<start>/forces.dat or force.dat; coefficients are not read"
+        raise InputError(str(path), f"no output of forces{seen}", text)
     for name in source.parts:
         if name not in found:
             raise InputError(str(path), f"no function object {name!r}", ", ".join(found))

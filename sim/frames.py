@@ -64,8 +64,7 @@ class Frame:
         if self.rotations not in ("", *SENSES):
             raise FrameError(f"frame rotations = {self.rotations!r}; allowed: {', '.join(SENSES)}")
         if self.signs["x"] * self.signs["y"] * self.signs["z"] < 0 and not self.rotations:
-            text = "state rotations: left-hand when N = x Y - y X in these axes, else right-hand"
-            raise FrameError(f"frame {self} is left-handed; {text}")
+            raise FrameError(f"frame {self} is left-handed and does not say by which hand it turns")
 
     @cached_property
     def signs(self) -> dict[str, int]:

@@ -167,7 +167,7 @@ def test_dimensionless_loads_give_the_same_coefficients(tables, rows, tmp_path, 
 
 
 def test_left_handed_without_a_hand_is_refused():
-    with pytest.raises(FrameError, match="rotations"):
+    with pytest.raises(FrameError, match="by which hand"):
         Frame("forward", "starboard", "up")
     with pytest.raises(FrameError, match="left-hand"):
         Frame("forward", "starboard", "up", "both")
@@ -226,6 +226,8 @@ def test_tare_and_strut_are_taken_off_in_the_campaigns_frame(tmp_path):
     assert run["X"] == pytest.approx(-(1000.0 - 500.0 - 30.0 * 4.0))
     assert run["Y"] == 5.0
     assert run["N"] == pytest.approx(-120.0)
+    with pytest.raises(InputError, match=r"tare\.2\.tests: 'tow'"):
+        one(tmp_path, "X_N", "1000", sources=tare.replace('"towing"', '"tow"'))
     with pytest.raises(InputError, match=r"tare\.0\.loads\.X"):
         one(tmp_path, "X_N", "1000", sources=tare.replace("0.5 kN", "0.5 m"))
 

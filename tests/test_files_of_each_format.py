@@ -6,13 +6,20 @@ what they get wrong is refused with file, row, column, what was found, what is a
 
 from __future__ import annotations
 
+import json
+import tomllib
+from pathlib import Path
+
 import numpy as np
 import pandas as pd
 import pytest
+from click.testing import CliRunner
 from made_campaigns import CONSTANTS, STEADY, campaign, history
 
 from ident.campaign import read_campaign
+from ident.cli import main
 from ident.quantities import factor, table
+from ident.readers.source import Source
 from sim.errors import InputError
 
 COLUMNS = ["X", "Y", "N"]
@@ -295,3 +302,31 @@ def test_constants_from_the_file_name(tmp_path):
 def test_files_that_are_not_there_are_named(tmp_path):
     with pytest.raises(InputError, match=r"no file 'runs\.csv'"):
         read_campaign(campaign(tmp_path, history("runs.csv")))
+
+
+def test_examples_of_the_documentation_fit_the_schema():
+    """Every TOML block of docs/readers.md is a source that is accepted."""
+    text = (Path(__file__).parents[1] / "docs" / "readers.md").read_text("utf-8")
+    examples = [block.split("```")[0] for block in text.split("```toml\n")[1:]]
+    assert len(examples) == 5
+    for example in examples:
+        data = tomllib.loads(example)["source"][0]
+        history_ = data.get("rows") == "history" and "reduction" not in data
+        Source.model_validate(data | ({"reduction": {"kind": "steady"}} if history_ else {}))
+
+
+def test_ident_runs_lists_and_plots(tmp_path):
+    source = history("runs.txt", NAMES)
+    campaign(tmp_path / "c", source)
+    (tmp_path / "c" / "runs.txt").write_text(ROWS)
+    done = CliRunner().invoke(main, ["runs", str(tmp_path / "c"), "--out", str(tmp_path / "out"), "--json", "-"])
+    assert done.exit_code == 0, done.output
+    found = json.loads(done.output)
+    assert found[0]["run_id"] == "runs"
+    assert found[0]["X"] == pytest.approx(MEANS[0], rel=1e-6)
+    assert found[0]["Z"] is None
+    assert (tmp_path / "out" / "history_runs.png").is_file()
+    (tmp_path / "c" / "runs.txt").write_text(ROWS + "1 2\n")
+    refused = CliRunner().invoke(main, ["runs", str(tmp_path / "c")])
+    assert refused.exit_code == 2
+    assert "row 401" in refused.output

@@ -249,6 +249,12 @@ def test_what_the_campaign_does_not_say_is_asked_for(run, source, words):
     assert words in str(caught.value)
 
 
+def test_a_case_of_force_coefficients_alone_is_refused(tmp_path):
+    written(tmp_path / "run" / "postProcessing" / "coeffs", {"coefficient.dat": COEFFICIENTS})
+    with pytest.raises(InputError, match=r"coefficient\.dat \(allowed: .*coefficients are not read"):
+        read_campaign(campaign(tmp_path, SOURCE + "rho_inf = 1.0\n" + STATE + STEADY, **MESH))
+
+
 def test_one_function_object_needs_no_part_map(run):
     source = history("run/postProcessing/forcesPlate", 'reader = "openfoam"\nrho_inf = 1.0')
     found = read_campaign(campaign(run, source, **MESH)).runs

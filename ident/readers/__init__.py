@@ -12,6 +12,7 @@ from ident.readers.table import OPENERS, Sheet
 from ident.readers.text import head
 from sim.errors import InputError
 
+_LOADS = ("forces", "movingForces", "force", "moment")
 _OUTPUTS = {"forces.dat", "movingForces.dat", "force.dat", "moment.dat", "coefficient.dat", "forceCoeffs.dat"}
 
 
@@ -80,7 +81,8 @@ def open_sheet(path: Path, source: Source) -> Sheet:
 
 
 def inputs(path: Path) -> list[Path]:
-    """Every file below a path that a reader may look at, for the digests."""
+    """Every file at or below a path that a reader may look at, for the digests."""
     if path.is_file():
         return [path]
-    return sorted(Path(root) / n for root, _, names in os.walk(path) for n in names if n.endswith(".dat"))
+    names = ((root, n) for root, _, found in os.walk(path) for n in found)
+    return sorted(Path(root) / n for root, n in names if n.endswith(".dat") and n.split(".")[0].split("_")[0] in _LOADS)
