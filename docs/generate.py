@@ -73,7 +73,7 @@ def accuracy(board: dict[str, Any]) -> str:
         for m, values in main_case["metrics"].items()
     ]
     mean = board["geometric_mean_ratio"]["untrained"]
-    digest = board["database"]["digest"][:16]
+    digest = main_case["database"]["digest"][:16]
     return "\n\n".join(
         [
             f"Captive-only database `{digest}`, no calibration, no factor; trained on no case. "

@@ -288,7 +288,10 @@ def _jacobian(task: Problem, theta: Array, sigma: Array, step: Array, workers: i
 
 
 def calibrate(
-    task: Problem, workers: int | None = None, each: Callable[[str], None] = lambda text: None, start: Array | None = None
+    task: Problem,
+    workers: int | None = None,
+    each: Callable[[str], None] = lambda text: None,
+    start: Array | None = None,
 ) -> Estimate:
     """Maximum a posteriori multipliers of a problem.
 

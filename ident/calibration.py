@@ -159,7 +159,9 @@ def load_calibration(name: str | Path) -> tuple[CalibrationFile, str, str]:
     elif Path(name).suffix == ".toml":
         with_name = name
     else:
-        raise InputError(str(name)[:200], "no such calibration", f"one of {', '.join(known)}, or a path to a .toml file")
+        raise InputError(
+            str(name)[:200], "no such calibration", f"one of {', '.join(known)}, or a path to a .toml file"
+        )
     data, where = read_toml(with_name, "cases")
     digest = hashlib.sha256(Path(where).read_bytes()).hexdigest()
     return checked(CalibrationFile, data, where), where, digest

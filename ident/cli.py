@@ -68,6 +68,7 @@ def main() -> None:
     \b
     ident check raw_captive_data/    what is wrong with the runs
     ident fit raw_captive_data/      identify coefficients, commit a version
+    ident runs raw_captive_data/     the run table as read, histories reduced
     ident report                     one HTML page on a version
     ident validate --case hzz20      fly a maneuver and compare
     """
@@ -158,6 +159,33 @@ def plan(folder: Path, target_rel: float, facility: Path | None, out: Path | Non
         console.print(f"test matrix: {out}", highlight=False)
     if json_path:
         _emit(summary(made, campaign), json_path)
+
+
+@main.command()
+@click.argument("folder", type=click.Path(path_type=Path))
+@OUT
+@click.option("--json", "json_path", default=None, metavar="PATH|-", help="Write the run table as JSON.")
+def runs(folder: Path, out: Path, json_path: str | None) -> None:
+    """Read a campaign and show its run table; plot the time histories it reduced.
+
+    \b
+    Example: ident runs raw_captive_data/ --out reports
+    """
+    from ident.list_runs import as_json, read, show
+
+    console = _console(quiet=json_path == "-")
+    with console.status("reading and reducing"):
+        found = read(folder)
+    for campaign in found:
+        show(campaign, console)
+    histories = tuple(one for campaign in found for one in campaign.reduced)
+    if histories:
+        from ident.reduction_figures import history_figures
+
+        for path in history_figures(histories, out):
+            console.print(f"figure: {path}", highlight=False)
+    if json_path:
+        _emit([row for campaign in found for row in as_json(campaign)], json_path)
 
 
 @main.command()

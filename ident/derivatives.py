@@ -25,10 +25,11 @@ from sim.vehicle import Vehicle
 
 Array = NDArray[np.float64]
 
-# Steps of the central difference, discretisation and not properties of a boat: about one
-# degree of flow angle, and the rate r L / U = 0.2 of a moderate turn.
-_FLOW_STEP = math.radians(1.0)
-_RATE_STEP = 0.2
+# Steps of the central difference, discretisation and not properties of a boat. Tables have
+# a kink at zero: about one degree of flow angle, and the rate r L / U = 0.2 of a moderate
+# turn. Constant coefficients have a slope there: small steps, so that v|v| does not enter.
+_TABLE_STEPS = (math.radians(1.0), 0.2)
+_CONSTANT_STEPS = (1e-6, 1e-6)
 _MOTIONS = "uvwpqr"
 _HULL = frozenset({"hull"})
 
@@ -111,6 +112,11 @@ def loads(model: kernel.Model, motion: Array, depth: float, controls: Array) -> 
     return work.loads[: len(OUTPUTS)].copy()
 
 
+def steps(vehicle: Vehicle) -> tuple[float, float]:
+    """Steps of the central differences: flow angle [rad], and rate times L / U."""
+    return _TABLE_STEPS if vehicle.term_set == "reduced" else _CONSTANT_STEPS
+
+
 def slope(model: kernel.Model, vehicle: Vehicle, name: str, speed: float, depth: float, revolutions: float) -> Array:
     """Central difference of the loads by one motion about straight ahead motion.
 
@@ -129,12 +135,13 @@ def slope(model: kernel.Model, vehicle: Vehicle, name: str, speed: float, depth:
     controls = np.zeros(len(vehicle.planes) + 1)
     controls[-1] = revolutions
     turned = name in "vw"
-    step = speed * math.sin(_FLOW_STEP) if turned else _RATE_STEP * speed / vehicle.particulars.length.value
+    flow, rate = steps(vehicle)
+    step = speed * math.sin(flow) if turned else rate * speed / vehicle.particulars.length.value
     side = []
     for sign in (1.0, -1.0):
         motion = np.zeros(6)
         # A flow angle turns the velocity: its size stays at the tabulated speed.
-        motion[0] = speed * math.cos(_FLOW_STEP) if turned else speed
+        motion[0] = speed * math.cos(flow) if turned else speed
         motion[_MOTIONS.index(name)] = sign * step
         side.append(loads(model, motion, depth, controls))
     return (side[0] - side[1]) / (2.0 * step)
@@ -155,7 +162,8 @@ def derivatives(
     kink at zero, where the slope of a small step would be that of the innermost interval
     alone, so the steps are those of a moderate maneuver: one degree of flow angle for v
     and w, the rate 0.2 U/L for p, q and r. Terms even in the motion cancel; a term odd but
-    not linear, such as p|p|, enters with its secant over the step.
+    not linear, such as p|p|, enters with its secant over the step. For a vehicle of constant
+    coefficients the steps are small, and the slopes are the linear coefficients themselves.
 
     Parameters
     ----------

@@ -123,7 +123,7 @@ def coefficient_table(rows: pd.DataFrame) -> list[dict[str, Any]]:
     """One row a coefficient: points, runs, worst disagreement, points by quality."""
     table = []
     for name, group in rows.groupby("coefficient", sort=False):
-        own = group[group["origin"] == "measured"]
+        own = group[group["origin"].isin(["measured", "published"])]
         counted = own if not own.empty else group
         table.append(
             {

@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from ident.campaign import DIRECT, Campaign, tests
 from ident.least_squares import gain_matrix, weights
 from ident.nodes import Node, key_point, table_points
+from ident.published import TEST as PUBLISHED
 from ident.wake import wake_fraction
 from sim.catalogue import ACCELERATIONS, OUTPUTS, Term
 from sim.forces import axis_values, boat_features, body_velocity, multiplier, plane_features
@@ -216,6 +217,25 @@ class Solver:
             self.skip(run, output, f"no term that {run['test']} identifies acts on this load in this state")
         return None
 
+    def direct_equation(self, run: pd.Series, output: str, features: dict[str, float]) -> Equation | None:
+        """A coefficient given as it is: of a propeller test, or published."""
+        published = run["test"] == PUBLISHED
+        term = self.by_name[run["coefficient"] if published else output]
+        if not published and run["test"] not in term.tests:
+            self.skip(run, output, f"{output} is not taken from a {run['test']} run")
+            return None
+        part = run["part"] if published else term.part
+        key, sign = self.canonical(term.name, part, self.place(term, features))
+        if published and sign == 0:
+            self.skip(run, output, f"{term.name} is zero by port/starboard symmetry")
+            return None
+        if not published:
+            # A propeller turns one way: the mirror does not hold for it.
+            sign = 1
+        node = self.node(key)
+        self.nodes[node].seen.add((part, key[2]))
+        return Equation(run, output, float(run[output]), float(run[f"s_{output}"]), {node: float(sign)}, {})
+
     def equations(self, run: pd.Series) -> list[Equation]:
         """Every usable load and directly measured coefficient of a run."""
         features = self.features(run)
@@ -230,14 +250,7 @@ class Solver:
             if output in OUTPUTS:
                 equation = self.load_equation(run, output, features)
             else:
-                term = self.by_name[output]
-                if run["test"] not in term.tests:
-                    self.skip(run, output, f"{output} is not taken from a {run['test']} run")
-                    continue
-                key, _ = self.canonical(term.name, term.part, self.place(term, features))
-                sigma, node = float(run[f"s_{output}"]), self.node(key)
-                self.nodes[node].seen.add((term.part, key[2]))
-                equation = Equation(run, output, float(run[output]), sigma, {node: 1.0}, {})
+                equation = self.direct_equation(run, output, features)
             if equation:
                 found.append(equation)
         return found
@@ -282,6 +295,7 @@ class Solver:
                 record = self.nodes[node]
                 record.runs.append(equation.run["run_id"])
                 record.qualities.append(equation.run["quality"])
+                record.tests.add(equation.run["test"])
                 record.worst = max(record.worst, score)
             if score > 2.0:
                 name = self.nodes[next(iter(equation.unknowns))].name

@@ -15,7 +15,7 @@ class Node:
     """One unknown tabulated value: coefficient, part, point, and the runs behind it.
 
     ``seen`` holds the (part, point) where runs stood: this one, its mirror image, or both.
-    ``worst`` is the largest disagreement among the runs, in standard errors.
+    ``tests`` names the tests of its runs. ``worst`` is the largest disagreement among the runs, in standard errors.
     """
 
     name: str
@@ -23,6 +23,7 @@ class Node:
     point: Point
     runs: list[str] = field(default_factory=list)
     qualities: list[str] = field(default_factory=list)
+    tests: set[str] = field(default_factory=set)
     worst: float = 0.0
     seen: set[tuple[str, Point]] = field(default_factory=set)
 

@@ -21,7 +21,7 @@ from ident.report_figures import draw_figures, equations, quality_colours
 from sim import catalogue
 from sim.catalogue import RULES, Term
 from sim.coefficients import Coefficients
-from sim.database import Version, axis_columns, read_rows, versions
+from sim.database import Version, axis_columns, own_version, read_rows
 from sim.errors import InputError
 from sim.frames import PROGRAM
 from sim.model import Environment
@@ -39,13 +39,6 @@ def _stored(metadata: dict[str, str], key: str, default: Any) -> Any:
     except ValueError:
         return default
     return found if isinstance(found, type(default)) else default
-
-
-def _commit(db: str, number: int, vehicle: str) -> Version:
-    """The commit that wrote the vehicle's rows of a version: others may have come later."""
-    history = [v for v in versions(db) if v.number <= number]
-    own = [v for v in history if v.metadata.get("vehicle", vehicle) == vehicle]
-    return (own or history or [Version(number, "", {})])[-1]
 
 
 def _time(stamp: str) -> str:
@@ -104,7 +97,9 @@ def _notes(term: Term, rows: pd.DataFrame) -> list[str]:
         both = (rows[columns["alpha"]] != 0.0) & (rows[columns["beta"]] != 0.0)
         if not both.any():
             notes.append("no run has alpha and beta together: superposed")
-    if not (rows["origin"] == "measured").any():
+    if (rows["origin"] == "published").any():
+        notes.append("given by the source as a coefficient, not by runs")
+    elif not (rows["origin"] == "measured").any():
         notes.append("all from the partner plane's runs by the mirror")
     return notes
 
@@ -128,7 +123,7 @@ def _coverage(vehicle: Vehicle, rows: pd.DataFrame, factors: dict[str, float]) -
             origin = own["origin"].value_counts()
             words = sorted({q for q in own["quality"] if q}, key=lambda q: factors.get(q, 0.0))
             row |= {
-                "measured": int(origin.get("measured", 0)),
+                "measured": int(origin.get("measured", 0) + origin.get("published", 0)),
                 "mirror": int(origin.get("mirror", 0)),
                 "symmetry": int(origin.get("symmetry", 0)),
                 "ranges": _ranges(term, own),
@@ -146,6 +141,9 @@ def _signs(coefficients: Coefficients, rows: pd.DataFrame) -> dict[str, Any]:
     """Derivatives at the largest tabulated speed and depth, where most data are."""
     columns = {a: c for c, a in axis_columns().items()}
     speed, depth = (float(rows[columns[a]].max()) for a in ("U", "D0"))
+    if coefficients.vehicle.term_set != "reduced":
+        # Constant coefficients have the same derivatives at every speed and depth.
+        speed, depth = 1.0, 0.0
     if speed > 0.0:
         found = derivatives(coefficients, _UNIT, speed, 0.0 if depth != depth else depth)
     else:
@@ -178,7 +176,7 @@ def _errata() -> list[dict[str, str]]:
 
 def _content(db: str, number: int, vehicle: Vehicle, rows: pd.DataFrame) -> dict[str, Any]:
     """Everything the template shows."""
-    commit = _commit(db, number, vehicle.name)
+    commit = own_version(db, vehicle.name, number)
     vocabulary = _vocabulary(commit.metadata, rows)
     colours = quality_colours(q["word"] for q in vocabulary)
     coverage = _coverage(vehicle, rows, {q["word"]: q["factor"] or 1.0 for q in vocabulary})

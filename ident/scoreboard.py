@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 from ident.validate import Validation, validate
 from sim.case import load_case
-from sim.database import find_version
+from sim.database import find_version, own_version, read_rows
 from sim.errors import InputError
 from sim.trim import NoEquilibrium
-from sim.vehicle import bundled
+from sim.vehicle import bundled, load_vehicle
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -37,6 +37,22 @@ def case_names(folder: Path | None) -> list[str]:
     return names + found
 
 
+def _flyable(names: list[str], present: set[str]) -> list[str]:
+    """Without the bundled cases of vehicles the database does not hold."""
+    own = bundled("cases")
+    found = [name for name in names if name not in own or load_case(name)[0].vehicle in present]
+    if not found:
+        raise InputError(f"vehicles {', '.join(sorted(present))}", "no case of them", "a folder of cases: --cases DIR")
+    return found
+
+
+def _trained(db: str, name: str, number: int) -> list[str]:
+    """Names of the cases that the coefficients of a case's vehicle were trained on."""
+    case, where = load_case(name)
+    vehicle = load_vehicle(case.vehicle, beside=where)
+    return list(json.loads(own_version(db, vehicle.name, number).metadata.get("trained", "[]")))
+
+
 def _mean_ratio(cases: list[dict[str, Any]]) -> float | None:
     ratios = [
         entry["ratio"]
@@ -51,7 +67,7 @@ def _mean_ratio(cases: list[dict[str, Any]]) -> float | None:
 def run_all(
     db: str, version: int | None, folder: Path | None, each: Callable[[str], None] = lambda name: None
 ) -> tuple[dict[str, Any], list[Validation]]:
-    """Fly every case from one version.
+    """Fly every case from one version; bundled cases only of vehicles it holds.
 
     Parameters
     ----------
@@ -72,12 +88,13 @@ def run_all(
     InputError
         As ``ident.validate.validate``.
     """
-    names = case_names(folder)
     record = find_version(db, version)
-    trained = json.loads(record.metadata.get("trained", "[]"))
+    present = {str(v) for v in read_rows(db, record.number)[0]["vehicle"].unique()}
+    names = _flyable(case_names(folder), present)
     flown, cases = [], []
     for name in names:
         each(name)
+        trained = _trained(db, name, record.number)
         try:
             done = validate(name, db, record.number)
         except NoEquilibrium as error:

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ident.derivatives import loads, prime_scale, slope
+from ident.derivatives import loads, prime_scale, slope, steps
 from sim import kernel
 from sim.catalogue import OUTPUTS
 from sim.coefficients import Coefficients
-from sim.model import Environment, assemble
+from sim.model import Environment, added_mass_matrix, assemble
 from sim.simulate import mixer_of, plane_limits
 from sim.trim import NoEquilibrium, self_propulsion
 from sim.vehicle import Vehicle
@@ -25,7 +25,9 @@ Array = NDArray[np.float64]
 # States of the linearised boat: positions x, y and heading are neutral and left out.
 _VERTICAL = (0, 2, 4, 8, 10)
 _HORIZONTAL = (1, 3, 5, 9)
-_STEP = 1e-4
+# Accelerations whose added mass a plane of motion cannot do without: w, q and v, r.
+_VERTICAL_INERTIA, _HORIZONTAL_INERTIA = (2, 4), (1, 5)
+_TABLE_STEP = 1e-4
 _DEFLECTION = math.radians(1.0)
 
 
@@ -36,25 +38,30 @@ class Stability:
     Attributes
     ----------
     speed, depth : U [m/s], D0 [m].
-    g_vertical, g_horizontal : Stability indices Gv, Gh; positive is stable.
+    g_vertical, g_horizontal : Stability indices Gv, Gh; positive is stable. None when the
+        derivatives of that plane of motion are absent.
     neutral_point_vertical, neutral_point_horizontal : Where a cross force gives no turn,
-        x of the neutral point over L, positive ahead of the origin.
+        x of the neutral point over L, positive ahead of the origin; None as above.
     critical_speed_stern, critical_speed_sail : Speed [m/s] at which the planes no longer
         change the depth (reversal speed), by group; None when there is none.
-    vertical, horizontal : Eigenvalues [1/s] of the motion about self-propulsion, real and
-        imaginary part, least stable first; empty when there is no self-propulsion state.
+    vertical, horizontal : Eigenvalues [1/s] of the motion about ``about``, real and imaginary
+        part, least stable first; empty when there is no such state, or no added mass of
+        that plane of motion.
+    about : ``self-propulsion``, or ``speed held``: straight and level with the planes at
+        zero and without surge, for a vehicle without propulsion data.
     """
 
     speed: float
     depth: float
-    g_vertical: float
-    g_horizontal: float
-    neutral_point_vertical: float
-    neutral_point_horizontal: float
+    g_vertical: float | None
+    g_horizontal: float | None
+    neutral_point_vertical: float | None
+    neutral_point_horizontal: float | None
     critical_speed_stern: float | None
     critical_speed_sail: float | None
     vertical: list[tuple[float, float]]
     horizontal: list[tuple[float, float]]
+    about: str
 
 
 def stability_index(force: float, moment: float, force_rate: float, moment_rate: float, mass: float) -> float:
@@ -95,8 +102,8 @@ def critical_speed(stiffness: float, z_w: float, m_w: float, z_d: float, m_d: fl
     """
     if z_d == 0.0:
         return None
-    square = stiffness / (m_w - m_d * z_w / z_d)
-    return math.sqrt(square) if square > 0.0 else None
+    turning = m_w - m_d * z_w / z_d
+    return math.sqrt(stiffness / turning) if stiffness * turning > 0.0 else None
 
 
 def _plane_slope(model: kernel.Model, vehicle: Vehicle, names: list[str], speed: float, depth: float) -> Array:
@@ -108,7 +115,7 @@ def _plane_slope(model: kernel.Model, vehicle: Vehicle, names: list[str], speed:
 
 
 def _eigenvalues(
-    model: kernel.Model, state: Array, controls: Array, kept: tuple[int, ...]
+    model: kernel.Model, state: Array, controls: Array, kept: tuple[int, ...], step: float
 ) -> list[tuple[float, float]]:
     work = kernel.workspace(controls.size - 1)
     jacobian = np.zeros((12, 12))
@@ -116,12 +123,37 @@ def _eigenvalues(
         side = []
         for sign in (1.0, -1.0):
             moved, rate = state.copy(), np.zeros(12)
-            moved[j] += sign * _STEP
+            moved[j] += sign * step
             kernel.rhs(model, moved, controls, work, rate)
             side.append(rate)
-        jacobian[:, j] = (side[0] - side[1]) / (2.0 * _STEP)
+        jacobian[:, j] = (side[0] - side[1]) / (2.0 * step)
     values = np.linalg.eigvals(jacobian[np.ix_(kept, kept)])
     return [(float(v.real), float(v.imag)) for v in sorted(values, key=lambda v: (-v.real, v.imag))]
+
+
+def _roots(
+    coefficients: Coefficients, environment: Environment, model: kernel.Model, speed: float, depth: float
+) -> tuple[list[list[tuple[float, float]]], str]:
+    """Vertical and horizontal eigenvalues [1/s], and the state they are about."""
+    vehicle = coefficients.vehicle
+    step = _TABLE_STEP if vehicle.term_set == "reduced" else min(steps(vehicle))
+    kept, about = [_VERTICAL, _HORIZONTAL], "self-propulsion"
+    if coefficients.get("KT") is None:
+        kept, about = [_VERTICAL[1:], _HORIZONTAL], "speed held"
+        state, controls = np.zeros(12), np.zeros(len(vehicle.planes) + 1)
+        state[0], state[8] = speed, depth - model.sail_top
+    else:
+        try:
+            trim = self_propulsion(model, mixer_of(vehicle), speed, depth, plane_limits(vehicle)[0])
+        except NoEquilibrium:
+            return [[], []], about
+        state, controls = trim.state, trim.controls
+    added = np.diag(added_mass_matrix(coefficients, environment))
+    found = []
+    for inertia, states in zip((_VERTICAL_INERTIA, _HORIZONTAL_INERTIA), kept, strict=True):
+        complete = bool((added[list(inertia)] > 0.0).all())
+        found.append(_eigenvalues(model, state, controls, states, step) if complete else [])
+    return found, about
 
 
 def stability(coefficients: Coefficients, environment: Environment, speed: float, depth: float) -> Stability:
@@ -157,22 +189,29 @@ def stability(coefficients: Coefficients, environment: Environment, speed: float
         by_command = _plane_slope(model, vehicle, planes, speed, depth)
         z_d, m_d = by_command[2] / dynamic, by_command[4] / (dynamic * length)
         reversal[group] = critical_speed(stiffness, prime("Z_w"), prime("M_w"), z_d, m_d)
-    try:
-        trim = self_propulsion(model, mixer_of(vehicle), speed, depth, plane_limits(vehicle)[0])
-        values = [_eigenvalues(model, trim.state, trim.controls, kept) for kept in (_VERTICAL, _HORIZONTAL)]
-    except NoEquilibrium:
-        values = [[], []]
+
+    def index(motions: str, outputs: str, inertia: float) -> float | None:
+        force, moment, force_rate, moment_rate = (prime(f"{o}_{m}") for m in motions for o in outputs)
+        found = stability_index(force, moment, force_rate, moment_rate, inertia)
+        return found if math.isfinite(found) else None
+
+    def neutral_point(output: str, by: str, sign: float) -> float | None:
+        force = prime(f"{output[0]}_{by}")
+        return sign * prime(f"{output[1]}_{by}") / force if force else None
+
+    values, about = _roots(coefficients, environment, model, speed, depth)
     return Stability(
         speed=speed,
         depth=depth,
-        g_vertical=stability_index(prime("Z_w"), prime("M_w"), prime("Z_q"), prime("M_q"), mass),
-        g_horizontal=stability_index(prime("Y_v"), prime("N_v"), prime("Y_r"), prime("N_r"), -mass),
-        neutral_point_vertical=-prime("M_w") / prime("Z_w"),
-        neutral_point_horizontal=prime("N_v") / prime("Y_v"),
+        g_vertical=index("wq", "ZM", mass),
+        g_horizontal=index("vr", "YN", -mass),
+        neutral_point_vertical=neutral_point("ZM", "w", -1.0),
+        neutral_point_horizontal=neutral_point("YN", "v", 1.0),
         critical_speed_stern=reversal["stern"],
         critical_speed_sail=reversal["sail"],
         vertical=values[0],
         horizontal=values[1],
+        about=about,
     )
 
 
@@ -196,14 +235,18 @@ def show(found: list[Stability], title: str, console: Console) -> None:
 
     def root(values: list[tuple[float, float]]) -> str:
         if not values:
-            return "no trim"
+            return "-"
         real, imaginary = values[0]
         return f"{real:+.4f}" + (f" +-{abs(imaginary):.4f}i" if imaginary else "")
 
+    def number(value: float | None) -> str:
+        return "-" if value is None else f"{value:+.3f}"
+
     for s in found:
-        points = f"{s.neutral_point_vertical:+.3f}, {s.neutral_point_horizontal:+.3f}"
+        points = f"{number(s.neutral_point_vertical)}, {number(s.neutral_point_horizontal)}"
         critical = f"{speed(s.critical_speed_stern)}, {speed(s.critical_speed_sail)}"
-        signs = [f"[{'green' if g > 0 else 'red'}]{g:+.3f}[/]" for g in (s.g_vertical, s.g_horizontal)]
+        signs = [f"[{'green' if (g or 0.0) > 0 else 'red'}]{number(g)}[/]" for g in (s.g_vertical, s.g_horizontal)]
         table.add_row(f"{s.speed:.3f}", f"{s.depth:g}", *signs, points, critical, root(s.vertical), root(s.horizontal))
     console.print(table)
-    console.print("last two columns: least stable root about self-propulsion")
+    states = " or ".join(dict.fromkeys(s.about for s in found))
+    console.print(f"last two columns: least stable root about straight level motion, {states}")

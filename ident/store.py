@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from ident import __version__
 from ident.identify import Identification
+from ident.published import TEST as PUBLISHED
 from sim.database import COUNTS, NUMBERS, axis_columns, column_order, read_rows, to_column, versions
 from sim.errors import InputError
 from sim.parts import parts_of, vehicle_terms
@@ -51,7 +52,8 @@ def database_rows(found: Identification) -> pd.DataFrame:
         for part in parts_of(term, vehicle):
             for point, index, sign in zip(*found.points(term, part), strict=True):
                 node = found.nodes[index]
-                origin = "measured" if (part, point) in node.seen else "mirror"
+                seen = "published" if node.tests == {PUBLISHED} else "measured"
+                origin = seen if (part, point) in node.seen else "mirror"
                 row: dict[str, Any] = {
                     "vehicle": vehicle.name,
                     "coefficient": term.name,

@@ -14,7 +14,7 @@ from ident.measure import measured
 from ident.sweep import with_grid
 from sim.case import Case, Reference, Series, load_case, load_reference, read_series
 from sim.coefficients import Coefficients
-from sim.database import axis_columns, find_version, read_rows
+from sim.database import axis_columns, own_version, read_rows
 from sim.errors import InputError
 from sim.schema import FrameData
 from sim.simulate import CHANNELS, Simulation, simulate
@@ -243,10 +243,11 @@ def validate(
     metrics, curve = measured(case, simulation, reference, own)
     grid = with_grid(case, coefficients, metrics)
     outside, constant = outside_tables(simulation, coefficients)
+    commit = own_version(db, vehicle.name, number)
     result = {
         "case": case.name,
         "vehicle": vehicle.name,
-        "database": {"path": db, "version": number, "digest": find_version(db, number).digest},
+        "database": {"path": db, "version": commit.number, "digest": commit.digest},
         "references": errors,
         "metrics": metrics,
         "outside_tables": outside,

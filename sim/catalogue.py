@@ -17,7 +17,7 @@ from functools import cache
 from importlib.resources import files
 
 OUTPUTS = ("X", "Y", "Z", "K", "M", "N")
-SETS = ("reduced", "gertler_hagen")
+SETS = ("reduced", "gertler_hagen", "mmg")
 # Extrapolation rules of an axis; ``sim.tables`` implements them.
 RULES = {
     "hold": "the value at the last point",
@@ -30,7 +30,7 @@ RULES = {
 
 # Sign of each output and state factor under the port/starboard mirror.
 MIRROR_OUTPUT = {"X": 1, "Y": -1, "Z": 1, "K": -1, "M": 1, "N": -1}
-MIRRORED_FACTORS = {"v", "p", "r", "sgn(v)", "deflection", "vdot", "pdot", "rdot"}
+MIRRORED_FACTORS = {"v", "p", "r", "sgn(v)", "v/U", "r/U", "deflection", "vdot", "pdot", "rdot"}
 
 # Everything a multiplier or an axis may name, in the order of the state-feature vector
 # that the forward model fills. ``S`` is sqrt(v^2 + w^2); ``V``, ``delta_c`` and ``delta``
@@ -39,6 +39,7 @@ BOAT_FEATURES = (
     *("u", "v", "w", "p", "q", "r", "|u|", "|v|", "|w|", "|p|", "|q|", "|r|"),
     *("U", "S", "sgn(v)", "sgn(w)", "alpha", "beta", "D0", "n", "|n|", "J"),
     *("up", "uq", "ur", "vp", "vq", "vr", "wp", "wq", "wr", "pq", "qr", "rp"),
+    *("v/U", "r/U"),
 )
 PLANE_FEATURES = ("V", "delta", "deflection")
 ACCELERATIONS = ("udot", "vdot", "wdot", "pdot", "qdot", "rdot")
@@ -66,7 +67,7 @@ class Term:
     Attributes
     ----------
     name : Symbol in Gertler-Hagen/Feldman style, unique within a set.
-    sets : Term sets the row belongs to (``reduced``, ``gertler_hagen``).
+    sets : Term sets the row belongs to (``reduced``, ``gertler_hagen``, ``mmg``).
     group : Physical group, for reports.
     output : Load component ``X Y Z`` [N] or ``K M N`` [N m]; empty for ``t`` and ``w_T``.
     power : Power of the reference length.
@@ -200,7 +201,8 @@ def terms(term_set: str = "reduced") -> tuple[Term, ...]:
     Parameters
     ----------
     term_set : ``reduced`` (Eqs. 26-31, tables) or ``gertler_hagen`` (Eqs. 17-22,
-        constant coefficients: all axes but J and those of t are dropped).
+        constant coefficients: all axes but J and those of t are dropped) or ``mmg`` (ships
+        in surge, sway and yaw: constant coefficients of Yasukawa and Yoshimura 2015).
 
     Raises
     ------

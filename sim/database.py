@@ -27,7 +27,7 @@ COLUMNS = {
     "stderr": "standard error of the value",
     "n_runs": "number of runs behind the value",
     "quality": "worst quality word among those runs",
-    "origin": "measured, mirror (port/starboard image of a run) or symmetry (zero by it)",
+    "origin": "measured, published (given as a coefficient), mirror (port/starboard image) or symmetry (zero by it)",
     "estimate": "values with the same number are one estimate",
     "correlation": "estimate:coefficient of every estimate whose error is correlated with this one's",
     "worst_residual": "largest disagreement among the runs, in standard errors",
@@ -168,3 +168,17 @@ def find_version(path: str, number: int | None = None) -> Version:
     """
     number = int(open_table(path, number).version())
     return next(v for v in versions(path) if v.number == number)
+
+
+def own_version(path: str, vehicle: str, number: int) -> Version:
+    """The commit that wrote a vehicle's rows of version ``number``: others may have come later.
+
+    Parameters
+    ----------
+    path : Folder or object-store URL of the database.
+    vehicle : Vehicle name.
+    number : Version that holds the rows.
+    """
+    history = [v for v in versions(path) if v.number <= number]
+    own = [v for v in history if v.metadata.get("vehicle", vehicle) == vehicle]
+    return (own or history or [Version(number, "", {})])[-1]

@@ -65,6 +65,7 @@ def boat_features(
     found |= {a + b: base[a] * base[b] for a in "uvw" for b in "pqr"}
     found |= {"pq": p * q, "qr": q * r, "rp": r * p}
     found["U"] = speed
+    found["v/U"], found["r/U"] = (v / speed, r / speed) if speed else (0.0, 0.0)
     found["S"] = math.hypot(v, w)
     found["sgn(v)"], found["sgn(w)"] = float(np.sign(v)), float(np.sign(w))
     found["alpha"] = math.atan2(w, u) if u or w else 0.0

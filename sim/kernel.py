@@ -119,6 +119,7 @@ def fill_features(m: Model, y: np.ndarray, c: np.ndarray, f: np.ndarray) -> None
     f[25], f[26], f[27] = v * p, v * q, v * r
     f[28], f[29], f[30] = w * p, w * q, w * r
     f[31], f[32], f[33] = p * q, q * r, r * p
+    f[34], f[35] = (v / speed, r / speed) if speed > 0.0 else (0.0, 0.0)
     for i in range(n_planes):
         x, yy, z = m.planes[i, 0], m.planes[i, 1], m.planes[i, 2]
         a = u + q * z - r * yy

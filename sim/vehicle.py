@@ -142,7 +142,7 @@ class Vehicle(Data):
     name: str
     title: str
     source: str
-    term_set: Literal["reduced", "gertler_hagen"]
+    term_set: Literal["reduced", "gertler_hagen", "mmg"]
     added_mass: Literal["sections", "derivatives"]
     frame: Axes
     particulars: Particulars

@@ -125,7 +125,7 @@ def test_unknown_frame_direction_lists_the_directions(tmp_path):
 
 def test_unknown_angle_convention_is_refused(tmp_path):
     assert_refused(
-        write(tmp_path, HEADER.replace('"flight"', '"ittc"')), "campaign.toml", "frame.angles", "ittc", "flight"
+        write(tmp_path, HEADER.replace('"flight"', '"compass"')), "campaign.toml", "frame.angles", "compass", "flight"
     )
 
 

@@ -34,6 +34,8 @@ DIMENSIONS = {
     **dict.fromkeys(("pdot", "qdot", "rdot"), (0, -2)),
     **dict.fromkeys(("sgn(v)", "sgn(w)", "alpha", "beta", "delta", "deflection", "J"), (0, 0)),
     "D0": (1, 0),
+    "v/U": (0, 0),
+    "r/U": (-1, 0),
 }
 UNITS = {"m/s": (1, -1), "m": (1, 0), "rad/s": (0, -1), "m/s2": (1, -2), "rad2/s2": (0, -2), "deg": (0, 0), "1": (0, 0)}
 SUFFIX = {"m/s": "mps", "m": "m", "rad/s": "radps", "m/s2": "mps2", "rad2/s2": "rad2ps2", "deg": "deg"}
@@ -75,7 +77,7 @@ def test_axis_columns_are_unique():
 @pytest.mark.parametrize("term_set", SETS)
 def test_names_are_unique_and_every_row_names_equation_and_test(term_set):
     terms = catalogue.terms(term_set)
-    assert len({t.name for t in terms}) == len(terms) > 80
+    assert len({t.name for t in terms}) == len(terms) > (20 if term_set == "mmg" else 80)
     with (files("ident") / "data" / "tests.csv").open(encoding="utf-8") as stream:
         known = {r["test"] for r in csv.DictReader(stream)}
     for term in terms:
@@ -103,7 +105,7 @@ def test_parity_of_hull_rows_follows_from_the_mirror_of_the_state(term_set):
     here, there = _mirrored_features(np.random.default_rng(3))
     load_sign = dict(zip(OUTPUTS, (1, -1, 1, -1, 1, -1), strict=True)) | {"": 1}
     rows = [t for t in catalogue.terms(term_set) if not set(t.factors) & set(catalogue.PLANE_FEATURES)]
-    assert len(rows) > 60
+    assert len(rows) > (20 if term_set == "mmg" else 60)
     for term in rows:
         ratio = multiplier(term, there) / multiplier(term, here)
         assert abs(ratio) == pytest.approx(1.0, abs=1e-14)
@@ -138,7 +140,8 @@ def test_parity_of_plane_rows_follows_from_the_mirrored_plane():
 
 
 def _vehicle_for(term_set, term):
-    vehicle = load_vehicle("bb2")
+    boats = [load_vehicle(name) for name in ("bb2", "suboff")]
+    vehicle = next(v for v in boats if term.part == "section" or term.part in v.part_names())
     kind = "derivatives" if term.group == "added mass" else "sections"
     return vehicle.model_copy(update={"term_set": term_set, "added_mass": kind})
 

@@ -1,0 +1,115 @@
+"""``[[source]]`` of ``campaign.toml``: which files, in which format, and what stands in them."""
+
+from __future__ import annotations
+
+import re
+from typing import Annotated, Literal
+
+from pydantic import Field, field_validator, model_validator
+
+from sim.schema import Data
+
+READERS = ("table", "parquet", "starccm", "columns", "openfoam")
+# Motion of an oscillatory test -> velocity and acceleration it makes.
+MOTIONS = {
+    "surge": ("u", "udot"),
+    "sway": ("v", "vdot"),
+    "heave": ("w", "wdot"),
+    "roll": ("p", "pdot"),
+    "pitch": ("q", "qdot"),
+    "yaw": ("r", "rdot"),
+}
+Vector = Annotated[list[float], Field(min_length=3, max_length=3)]
+Positive = Annotated[float, Field(gt=0, le=1e9)]
+
+
+class Reduction(Data):
+    """How a time history becomes runs.
+
+    Attributes
+    ----------
+    kind : ``steady``: means. ``oscillatory``: harmonics 0-3 at the known frequency, then
+        four runs, at the ends of the velocity and of the acceleration. ``acceleration``:
+        the value at mid-time of a constant acceleration.
+    start_s, end_s : Window, by hand; the start-up transient is found within it.
+    rate_hz : Sampling rate, where the time column cannot be trusted; time is then the row.
+    motion : What oscillates.
+    frequency_hz : Its frequency, unless a column ``frequency`` gives it.
+    amplitude : Amplitude of the displacement [m or rad], unless a column ``displacement``
+        measures it.
+    phase_deg : Phase of the displacement at time zero, A sin(2 pi f t + phase).
+    """
+
+    kind: Literal["steady", "oscillatory", "acceleration"]
+    start_s: float | None = None
+    end_s: float | None = None
+    rate_hz: Positive | None = None
+    motion: Literal["surge", "sway", "heave", "roll", "pitch", "yaw"] | None = None
+    frequency_hz: Positive | None = None
+    amplitude: Annotated[float, Field(gt=0, le=1e6)] | None = None
+    phase_deg: Annotated[float, Field(ge=-360, le=360)] = 0.0
+
+    @model_validator(mode="after")
+    def _motion_is_named(self) -> Reduction:
+        if self.kind == "oscillatory" and self.motion is None:
+            raise ValueError(f"motion, one of {', '.join(MOTIONS)}: an oscillatory test needs it")
+        if self.start_s is not None and self.end_s is not None and self.end_s <= self.start_s:
+            raise ValueError("end_s after start_s")
+        return self
+
+
+class Source(Data):
+    """Some files of a campaign that share a format; every key is in ``docs/readers.md``."""
+
+    files: Annotated[str, Field(min_length=1, max_length=300)]
+    reader: Literal["table", "parquet", "starccm", "columns", "openfoam"] | None = None
+    rows: Literal["runs", "history"] = "runs"
+    columns: dict[str, str] = Field(default_factory=dict)
+    patterns: dict[str, str] = Field(default_factory=dict)
+    ignore: list[str] = Field(default_factory=list)
+    names: list[str] = Field(default_factory=list)
+    header_pattern: str = ""
+    units_row: bool = False
+    delimiter: Literal["", ",", ";", "\t", " "] = ""
+    decimal: Literal["", ".", ","] = ""
+    thousands: Literal["", ".", ",", "'", " "] = ""
+    encoding: Literal["utf-8", "latin-1"] = "utf-8"
+    constants: dict[str, str | float] = Field(default_factory=dict)
+    match: str = ""
+    normalisation: str = ""
+    parts: dict[str, str] = Field(default_factory=dict)
+    rho_inf: Positive | None = None
+    vehicle_origin: Vector | None = None
+    reduction: Reduction | None = None
+
+    @field_validator("match", "header_pattern")
+    @classmethod
+    def _pattern_compiles(cls, text: str) -> str:
+        _compiled(text)
+        return text
+
+    @field_validator("patterns")
+    @classmethod
+    def _patterns_compile(cls, patterns: dict[str, str]) -> dict[str, str]:
+        for text in patterns:
+            _compiled(text)
+        return patterns
+
+    @model_validator(mode="after")
+    def _reduction_fits(self) -> Source:
+        if self.rows == "history" and self.reduction is None:
+            raise ValueError("a table [source.reduction]: rows = 'history' needs it")
+        if self.rows == "runs" and self.reduction is not None and self.reduction.kind != "oscillatory":
+            raise ValueError("rows = 'history': only time histories are reduced")
+        if self.reader == "openfoam" and self.rows != "history":
+            raise ValueError("rows = 'history': OpenFOAM writes time histories")
+        if self.files.startswith(("/", "~")) or ".." in self.files.replace("\\", "/").split("/"):
+            raise ValueError("a path below the campaign folder")
+        return self
+
+
+def _compiled(text: str) -> None:
+    try:
+        re.compile(text)
+    except (re.error, RecursionError, OverflowError) as error:
+        raise ValueError(f"a regular expression: {error}") from error

@@ -1,0 +1,286 @@
+"""Files of a source to rows of the run table, in SI and the campaign's own frame."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from ident.campaign_file import CampaignFile
+from ident.conversions import dimensional, quantity_of
+from ident.histories import Channels, Pieces, Reduced, reduce, states
+from ident.quantities import Column, column, owner, suffixed
+from ident.readers import matching, open_sheet, openfoam, reader_of
+from ident.readers.source import Source
+from ident.readers.table import Sheet, columns_of, run_cells
+from ident.readers.text import LARGEST, Dialect
+from sim.errors import InputError
+
+TEXT = ("run_id", "test", "part", "quality", "source", "copy_of", "exclude", "reason", "decoupled", "coefficient")
+REQUIRED = ("run_id", "test", "part", "quality", "source")
+_PLAIN = Dialect()
+
+
+def source_runs(folder: Path, source: Source, header: CampaignFile) -> tuple[pd.DataFrame, list[Reduced], list[Path]]:
+    """All runs of one source.
+
+    Parameters
+    ----------
+    folder : The campaign's.
+    source : One ``[[source]]``.
+    header : The campaign, for frame, scale and density.
+
+    Returns
+    -------
+    runs : Text columns, quantities in SI, ``file``, ``row``, ``reduction``.
+    reduced : The histories that were reduced, in order.
+    inputs : Paths that were read.
+
+    Raises
+    ------
+    InputError
+        Naming file, row, column, what was found and what is allowed.
+    """
+    paths = matching(folder, source)
+    where = str(folder / "campaign.toml")
+    tables: list[pd.DataFrame] = []
+    reduced: list[Reduced] = []
+    for path in paths:
+        stated = constants(folder, path, source)
+        if source.rows == "history":
+            table, found = _from_histories(path, source, header, stated, where)
+            reduced += found
+        else:
+            table = _from_table(path, source, header, stated, where)
+        tables.append(table)
+    return pd.concat(tables, ignore_index=True), reduced, paths
+
+
+def constants(folder: Path, path: Path, source: Source) -> tuple[dict[str, str], dict[str, float], set[str]]:
+    """What the campaign says of every run of a file: ``constants``, and ``match`` on its path.
+
+    Returns
+    -------
+    words : Text columns.
+    numbers : Quantities in SI.
+    primed : Those that are dimensionless.
+
+    Raises
+    ------
+    InputError
+        For a path that does not match, an unknown quantity, or no finite number.
+    """
+    where = f"{folder / 'campaign.toml'}, key source.constants"
+    given: dict[str, Any] = dict(source.constants)
+    if source.match:
+        name = path.relative_to(folder).as_posix()
+        found = re.search(source.match, name)
+        if not found:
+            raise InputError(f"{folder / 'campaign.toml'}, key source.match", f"{name!r} does not match", source.match)
+        given |= {k: v for k, v in found.groupdict().items() if v is not None}
+    words: dict[str, str] = {}
+    numbers: dict[str, float] = {}
+    primed: set[str] = set()
+    for key, value in given.items():
+        if key in TEXT:
+            words[key] = str(value).strip()
+            continue
+        place = f"{where}.{key}"
+        if key in suffixed() or not isinstance(value, str):
+            kind = column(key, None, where)
+            number = _PLAIN.number(str(value))
+            if number is None:
+                raise InputError(place, repr(str(value)[:60]), "a finite number")
+            numbers[kind.quantity] = number * kind.factor
+            primed |= {kind.quantity} if kind.primed else set()
+        elif owner(key):
+            numbers[key] = quantity_of(value, owner(key), place)
+        else:
+            raise InputError(place, repr(value[:60]), "a quantity, or one of " + ", ".join(TEXT))
+    return words, numbers, primed
+
+
+Stated = tuple[dict[str, str], dict[str, float], set[str]]
+
+
+def _from_table(path: Path, source: Source, header: CampaignFile, stated: Stated, where: str) -> pd.DataFrame:
+    """A table with a row a run."""
+    words, numbers, primed = stated
+    sheet = open_sheet(path, source)
+    kinds = columns_of(sheet, source, TEXT)
+    table, rows = run_cells(sheet)
+    columns: dict[str, Any] = {}
+    for name, kind in zip(sheet.header, kinds, strict=True):
+        if kind is None:
+            text = source.columns.get(name, name)
+            if text in TEXT:
+                columns[text] = table[name].str.strip().to_numpy()
+        else:
+            columns[kind.quantity] = _numbers(sheet, table[name], rows, kind)
+            primed = primed | ({kind.quantity} if kind.primed else set())
+    for name, value in {**words, **numbers}.items():
+        if name in columns:
+            raise InputError(f"{sheet.where}, column {name}", "also in [source.constants]", "one of the two")
+        columns[name] = value
+    _required(sheet, columns, source)
+    if "run_id" not in columns:
+        columns["run_id"] = [f"{path.stem}-{row}" for row in rows]
+    columns.setdefault("source", path.name)
+    for name in TEXT:
+        columns.setdefault(name, "")
+    out = pd.DataFrame({**columns, "file": path.name, "row": rows, "reduction": ""}, index=range(len(rows)))
+    out = dimensional(out, primed, source.normalisation, header, where)
+    return _spread(out, source, header, str(path)) if source.reduction else out
+
+
+def _required(sheet: Sheet, columns: dict[str, Any], source: Source) -> None:
+    optional = {"run_id", "source"} if source.columns or source.constants else set()
+    optional |= {"test"} if source.reduction else set()
+    for name in REQUIRED:
+        if name not in columns and name not in optional:
+            text = f"columns {', '.join(REQUIRED)} and quantities"
+            raise InputError(str(sheet.path), f"column {name} missing", text)
+
+
+def _numbers(sheet: Sheet, text: pd.Series, rows: list[int], kind: Column) -> np.ndarray:
+    """A column of a run table as numbers; blank is NaN."""
+    values = np.full(len(text), np.nan)
+    for i, cell in enumerate(text):
+        if not cell.strip():
+            continue
+        value = sheet.dialect.number(cell)
+        if value is None:
+            place = f"{sheet.path}, row {rows[i]}, column {kind.name[:60]}"
+            raise InputError(place, repr(cell[:60]), f"a finite number of at most {LARGEST:g}, or blank")
+        if value < 0.0 and (kind.quantity.startswith("s_") or kind.quantity == "rel_sigma"):
+            raise InputError(f"{sheet.path}, row {rows[i]}, column {kind.name[:60]}", cell[:60], "zero or more")
+        values[i] = value * kind.factor
+    return values
+
+
+def _spread(table: pd.DataFrame, source: Source, header: CampaignFile, where: str) -> pd.DataFrame:
+    """Rows of harmonics to the four states of each oscillation."""
+    assert source.reduction is not None
+    frame, ittc = header.frame.frame, header.frame.angles == "ittc"
+    found = []
+    for run in table.to_dict("records"):
+        place = f"{where}, row {run['row']}"
+        found += states({str(k): v for k, v in run.items()}, source.reduction, frame, ittc, place)
+    return pd.DataFrame(found)
+
+
+def _from_histories(
+    path: Path, source: Source, header: CampaignFile, stated: Stated, where: str
+) -> tuple[pd.DataFrame, list[Reduced]]:
+    """A file or case that is one history a part."""
+    assert source.reduction is not None
+    words, numbers, primed = stated
+    rule = source.reduction
+    if primed:
+        one_run = pd.DataFrame([{**numbers, "file": path.name, "row": 1}])
+        made = dimensional(one_run, primed, source.normalisation, header, where).iloc[0]
+        numbers = {k: float(made[k]) for k in numbers}
+    frame, ittc = header.frame.frame, header.frame.angles == "ittc"
+    rows: list[dict[str, Any]] = []
+    reduced = []
+    for part, channels in _channels(path, source, header, numbers, where):
+        own = dict(words) | ({"part": part} if part else {})
+        name = own.get("run_id") or path.stem
+        own["run_id"] = f"{name}-{part}" if part else name
+        frequency = numbers.get("frequency", rule.frequency_hz)
+        values, one = reduce(channels, rule, own["run_id"], frequency)
+        for quantity in values:
+            if quantity in numbers and quantity != "frequency":
+                found = f"{quantity} is measured and stands in [source.constants]"
+                raise InputError(str(channels.path), found, "one of the two")
+        run = {**dict.fromkeys(TEXT, ""), "source": f"{path.name}, reduced", **own, **numbers, **values}
+        run |= {"file": path.name, "row": 1, "reduction": one.words(), "converged": one.fit.converged}
+        rows += states(run, rule, frame, ittc, str(path)) if rule.kind == "oscillatory" else [run]
+        reduced.append(one)
+    out = pd.DataFrame(rows)
+    for name in REQUIRED:
+        missing = (out[name] == "") if name in out else pd.Series(True, index=out.index)
+        if missing.any():
+            raise InputError(str(path), f"{name} missing", f"{name} in [source.constants], or (?P<{name}>...) in match")
+    return out, reduced
+
+
+def _channels(
+    path: Path, source: Source, header: CampaignFile, numbers: dict[str, float], where: str
+) -> Iterator[tuple[str, Channels]]:
+    """The histories of a path: part (empty where the campaign names it) and channels."""
+    if reader_of(path, source) == "openfoam":
+        yield from _openfoam(path, source, header, where)
+        return
+    sheet = open_sheet(path, source)
+    wanted = [(i, k) for i, k in enumerate(columns_of(sheet, source, ())) if k is not None]
+    if not wanted:
+        raise InputError(sheet.where, "no column that is a quantity", "time and loads")
+    names = [k.quantity for _, k in wanted]
+    primed = {k.quantity for _, k in wanted if k.primed}
+    one = pd.DataFrame([{**dict.fromkeys(names, 1.0), "U": numbers.get("U"), "file": path.name, "row": 1}])
+    scales = dimensional(one, primed, source.normalisation, header, where).iloc[0]
+    factors = np.array([float(scales[k.quantity]) if k.primed else k.factor for _, k in wanted])
+
+    def pieces() -> Iterator[np.ndarray]:
+        for block in sheet.numbers([i for i, _ in wanted]):
+            yield block * factors
+
+    yield "", Channels(path, names, pieces)
+
+
+def _openfoam(path: Path, source: Source, header: CampaignFile, where: str) -> Iterator[tuple[str, Channels]]:
+    """The function objects of an OpenFOAM case, each the history of one part."""
+    if source.rho_inf is None:
+        text = "the rhoInf of the function object: 1 for kinematic loads, or the density it used"
+        raise InputError(f"{where}, key source.rho_inf", "nothing", text)
+    if not path.is_dir():
+        raise InputError(str(path), "a file", "a case folder, its postProcessing, or one function object in it")
+    try:
+        found = openfoam.objects(path)
+    except OSError as error:
+        raise InputError(str(path), f"cannot be read: {error.strerror}", "a readable folder") from error
+    if not found:
+        others = sorted({p.name for p in path.glob("**/*.dat")})[:5]
+        seen = f", only {', '.join(others)}" if others else ""
+        text = "postProcessing/<function object>/<start>/forces.dat or force.dat; coefficients are not read"
+        raise InputError(str(path), f"no output of forces{seen}", text)
+    for name in source.parts:
+        if name not in found:
+            raise InputError(str(path), f"no function object {name!r}", ", ".join(found))
+    chosen = source.parts or (dict.fromkeys(found, "") if len(found) == 1 else {})
+    if not chosen:
+        text = f"[source.parts] naming the part of each: {', '.join(found)}"
+        raise InputError(str(path), f"{len(found)} function objects", text)
+    for name, part in chosen.items():
+        yield part, Channels(path, ["time", *openfoam.LOADS], _foam_pieces(found[name], source, header))
+
+
+def _foam_pieces(folder: Path, source: Source, header: CampaignFile) -> Pieces:
+    """Starts reading one function object: SI, moments about the campaign's point."""
+    density = header.fluid.density_kgpm3 / float(source.rho_inf or 1.0)
+    point = header.moment_point
+    origin = source.vehicle_origin
+
+    def pieces() -> Iterator[np.ndarray]:
+        fixed = None
+        for values, centre, moving in openfoam.loads(folder):
+            if not moving:
+                if fixed is not None and (centre != fixed).any():
+                    raise InputError(str(folder), f"CofR {fixed} and {centre}", "one moment point in all restarts")
+                fixed = centre
+            elif origin is not None:
+                text = "no vehicle_origin: a moving CofR is the body's moment point"
+                raise InputError(str(folder), "CofR moves", text)
+            out = values.copy()
+            if origin is not None:
+                arm = centre - np.array(origin) - np.array([point.x_m, point.y_m, point.z_m])
+                out[:, 4:] += np.cross(np.broadcast_to(arm, (len(out), 3)), out[:, 1:4])
+            out[:, 1:] *= density
+            yield out
+
+    return pieces

@@ -1,0 +1,255 @@
+"""Authority: invariants. The bundled campaign in another frame, hand, unit system, scale, moment
+point, sign of drift and normalisation, all at once, gives the same coefficients; half models,
+tare and model inertia by closed forms.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pandas as pd
+import pytest
+from made_campaigns import campaign
+from test_campaign_conversions import BB2, assert_same, header, number, rewritten, text
+
+from ident.campaign import read_campaign
+from sim.errors import InputError
+from sim.frames import Frame, FrameError
+
+AXES = {
+    "x": (["X_N", "udot_mps2", "x_m"], ["K_Nm", "p_radps"]),
+    "y": (["Y_N", "vdot_mps2", "y_m"], ["M_Nm", "q_radps"]),
+    "z": (["Z_N", "wdot_mps2", "z_m"], ["N_Nm", "r_radps"]),
+}
+
+
+@pytest.fixture(scope="module")
+def tables():
+    return {p.name: pd.read_csv(p, dtype=str, keep_default_na=False) for p in sorted(BB2.glob("*.csv"))}
+
+
+def turned(tables, signs: dict[str, int], hand: int):
+    """Every vector turned by hand from the source frame (x aft, y starboard, z up)."""
+    other = {}
+    for name, table in tables.items():
+        other[name] = table.copy()
+        for axis, (vectors, rotations) in AXES.items():
+            for columns, sign in ((vectors, signs[axis]), (rotations, signs[axis] * hand)):
+                for column in [c for c in columns if c in table]:
+                    other[name][column] = text(sign * number(table[column]))
+    return other
+
+
+def scaled(tables, ratio: float):
+    powers = {"U_mps": -0.5, "n_rps": 0.5} | dict.fromkeys(("D0_m", "R0_m", "x_m", "y_m", "z_m"), -1)
+    powers |= {f"{rate}_radps": 0.5 for rate in "pqr"}
+    powers |= {f"{o}_N": -3 for o in "XYZ"} | {f"{o}_Nm": -4 for o in "KMN"}
+    other = {}
+    for name, table in tables.items():
+        other[name] = table.copy()
+        for column in [c for c in powers if c in table]:
+            other[name][column] = text(number(table[column]) * ratio ** powers[column])
+    return other
+
+
+def moved(tables, point: tuple[float, float, float], hand: int):
+    """Moments about another point; in a frame of the left hand N = x Y - y X all the same."""
+    x, y, z = point
+    other = {}
+    for name, table in tables.items():
+        table = table.copy()
+        moments = [f"{m}_Nm" for m in "KMN" if f"{m}_Nm" in table]
+        for force in "XYZ" if moments else ():
+            column = table.get(f"{force}_N", pd.Series("", index=table.index))
+            table[f"{force}_N"] = column.mask(column == "", "0")
+        if moments:
+            fx, fy, fz = (number(table[f"{o}_N"]) for o in "XYZ")
+            for moment, arm in (("K", y * fz - z * fy), ("M", z * fx - x * fz), ("N", x * fy - y * fx)):
+                if f"{moment}_Nm" in table:
+                    table[f"{moment}_Nm"] = text(number(table[f"{moment}_Nm"]) - hand * arm)
+        other[name] = table
+    return other
+
+
+def in_units(tables):
+    """Feet, pounds and knots in brackets, angles in radians."""
+    pound, foot = 4.4482216152605, 0.3048
+    units = {f"{o}_N": (f"{o} [lbf]", pound) for o in "XYZ"} | {
+        f"{o}_Nm": (f"{o} [lbf*ft]", pound * foot) for o in "KMN"
+    }
+    units |= {f"{c}_m": (f"{c} (ft)", foot) for c in ("D0", "R0", "x", "y", "z")}
+    units |= {f"{r}_radps": (f"{r} [deg/s]", math.radians(1)) for r in "pqr"}
+    units |= {
+        "U_mps": ("U [ft/s]", foot),
+        "n_rps": ("n [1/min]", 1 / 60),
+        "alpha_deg": ("alpha [rad]", math.degrees(1)),
+    }
+    other = {}
+    for name, table in tables.items():
+        table = table.copy()
+        for column in [c for c in units if c in table]:
+            table[column] = text(number(table[column]) / units[column][1])
+        other[name] = table.rename(columns={c: u[0] for c, u in units.items()})
+    return other
+
+
+def frame_text(x: str, y: str, z: str, rotations: str, angles: str = "flight") -> str:
+    found = header().replace('x = "aft"', f'x = "{x}"').replace('z = "up"', f'z = "{z}"')
+    found = found.replace('y = "starboard"', f'y = "{y}"\nrotations = "{rotations}"')
+    return found.replace('angles = "flight"', f'angles = "{angles}"')
+
+
+@pytest.mark.parametrize("hand", [1, -1])
+@pytest.mark.parametrize(("x", "y", "z"), [("forward", "starboard", "up"), ("aft", "port", "up")])
+def test_a_left_handed_frame_gives_the_same_coefficients(tables, rows, tmp_path, x, y, z, hand):
+    signs = {"x": -1 if x == "forward" else 1, "y": -1 if y == "port" else 1, "z": -1 if z == "down" else 1}
+    head = frame_text(x, y, z, "right-hand" if hand > 0 else "left-hand")
+    assert_same(rewritten(tmp_path / "c", turned(tables, signs, hand), head), rows, 1e-12)
+
+
+def test_the_ship_sign_of_drift_gives_the_same_coefficients(tables, rows, tmp_path):
+    other = {n: t.copy() for n, t in tables.items()}
+    for table in other.values():
+        if "beta_deg" in table:
+            table["beta_deg"] = text(-number(table["beta_deg"]))
+    head = frame_text("aft", "starboard", "up", "right-hand", "ittc")
+    assert_same(rewritten(tmp_path / "c", other, head), rows, 1e-12)
+
+
+def test_everything_at_once_gives_the_same_coefficients_to_1e_9(tables, rows, tmp_path):
+    """Model scale, a left-handed frame, another moment point, feet and pounds, ITTC drift."""
+    ratio, point = 18.348, (0.21, -0.05, 0.13)
+    signs = {"x": -1, "y": 1, "z": 1}
+    other = moved(turned(scaled(tables, ratio), signs, -1), point, 1)
+    for table in other.values():
+        if "beta_deg" in table:
+            table["beta_deg"] = text(-number(table["beta_deg"]))
+    head = frame_text("forward", "starboard", "up", "left-hand", "ittc")
+    head = head.replace("ratio = 1.0", f"ratio = {ratio}").replace("length_m = 70.2", f"length_m = {70.2 / ratio}")
+    for axis, value in zip("xyz", point, strict=True):
+        head = head.replace(f"{axis}_m = 0.0", f"{axis}_m = {value}")
+    assert_same(rewritten(tmp_path / "c", in_units(other), head), rows, 1e-9)
+
+
+@pytest.mark.parametrize("name", ["half_rho_L2", "half_rho_Ld"])
+def test_dimensionless_loads_give_the_same_coefficients(tables, rows, tmp_path, name):
+    """Primes by hand: forces by 1/2 rho U^2 L^2 or L d, moments by one length more."""
+    length, depth = 70.2, 9.6
+    area = length * (length if name == "half_rho_L2" else depth)
+    other, primed = {}, []
+    for file, table in tables.items():
+        other[file] = table = table.copy()
+        speed = number(table["U_mps"]) if "U_mps" in table else pd.Series(0.0, index=table.index)
+        if not (speed > 0).all() or file == "acceleration.csv":
+            continue
+        primed.append(file)
+        names = {}
+        for load in "XYZKMN":
+            column = f"{load}_N" if load in "XYZ" else f"{load}_Nm"
+            if column in table:
+                scale = 0.5 * 1025.0 * speed**2 * area * (1.0 if load in "XYZ" else length)
+                table[column] = text(number(table[column]) / scale)
+                names[column] = f"{load}'"
+        for rate in "pqr":
+            if f"{rate}_radps" in table:
+                table[f"{rate}_radps"] = text(number(table[f"{rate}_radps"]) * length / speed)
+                names[f"{rate}_radps"] = f"{rate} [-]"
+        other[file] = table.rename(columns=names)
+    assert len(primed) > 4
+    plain = [f for f in other if f not in primed]
+    sources = "".join(f'[[source]]\nfiles = "{f}"\nnormalisation = "{name}"\n' for f in primed)
+    sources += "".join(f'[[source]]\nfiles = "{f}"\n' for f in plain)
+    head = header().replace("length_m = 70.2", f"length_m = 70.2\ndraught_m = {depth}") + sources
+    got = rewritten(tmp_path / "c", other, head)
+    key = ["coefficient", "part", "origin", "speed_mps", "alpha_deg", "beta_deg", "delta_deg", "depth_m", "q_radps"]
+    assert_same(got.sort_values(key, ignore_index=True), rows.sort_values(key, ignore_index=True), 1e-9)
+
+
+def test_left_handed_without_a_hand_is_refused():
+    with pytest.raises(FrameError, match="by which hand"):
+        Frame("forward", "starboard", "up")
+    with pytest.raises(FrameError, match="left-hand"):
+        Frame("forward", "starboard", "up", "both")
+    assert Frame("forward", "starboard", "up", "left-hand").sign("N") == 1
+    assert Frame("forward", "starboard", "up", "right-hand").sign("N") == -1
+    assert Frame("forward", "starboard", "up", "left-hand").sign("Y") == 1
+
+
+# -- closed forms ----------------------------------------------------------------------------
+
+STATE = "run_id,test,part,quality,source,U_mps,alpha_deg,beta_deg,D0_m,rel_sigma"
+
+
+def one(
+    folder, columns: str, values: str, state: str = "a,rotating_arm,hull,ok,tank,2,0,0,25,0.1", sources="", **tables
+):
+    campaign(folder, sources, **tables)
+    (folder / "runs.csv").write_text(f"{STATE},{columns}\n{state},{values}\n")
+    return read_campaign(folder).runs.iloc[0]
+
+
+def test_rotating_arm_of_a_model_in_air_measures_nothing(tmp_path):
+    """Loads of a rigid body alone, by hand for u, q, r and G off the axis: all six become zero."""
+    m, (x, z), (ixx, iyy, izz, izx) = 50.0, (0.3, 0.1), (2.0, 30.0, 31.0, 0.4)
+    u, q, r = 2.0, 0.2, 0.3
+    a = np.cross([0, q, r], [u, 0, 0]) + np.cross([0, q, r], np.cross([0, q, r], [x, 0, z]))
+    tensor = np.array([[ixx, 0, -izx], [0, iyy, 0], [-izx, 0, izz]])
+    force = -m * a
+    moment = -(np.cross([0, q, r], tensor @ [0, q, r]) + np.cross([x, 0, z], m * a))
+    inertia = (
+        f"model_inertia_in_loads = true\nmass_kg = {m}\ncentre_of_gravity_m = [{x}, 0.0, {z}]\n"
+        f'tensor_kgm2 = [{ixx}, {iyy}, {izz}, 0.0, 0.0, {izx}]\nsource = "weighed"'
+    )
+    values = ",".join(repr(float(v)) for v in (q, r, *force, *moment))
+    run = one(tmp_path, "q_radps,r_radps,X_N,Y_N,Z_N,K_Nm,M_Nm,N_Nm", values, inertia=inertia)
+    np.testing.assert_allclose(run[list("XYZKMN")].astype(float), 0.0, atol=1e-12)
+
+
+def test_model_inertia_needs_all_its_numbers_and_only_where_it_is_in_the_loads(tmp_path):
+    for text_, word in (
+        ("model_inertia_in_loads = true\nmass_kg = 50.0", "tensor_kgm2"),
+        ("model_inertia_in_loads = false\nmass_kg = 50.0", "nothing is taken off"),
+    ):
+        with pytest.raises(InputError, match=word):
+            one(tmp_path, "X_N", "1", inertia=text_)
+
+
+def test_tare_and_strut_are_taken_off_in_the_campaigns_frame(tmp_path):
+    tare = (
+        '[[tare]]\nwhat = "zero reading"\nsource = "log"\nloads = { X = "0.5 kN", N = "-20 N*m" }\n'
+        '[[tare]]\nwhat = "strut"\nsource = "towed alone"\nper_speed_squared = { X = 30.0 }\n'
+        '[[tare]]\nwhat = "other"\nsource = "log"\nloads = { Y = "9 N" }\ntests = ["towing"]\n'
+    )
+    frame = 'x = "aft"\ny = "starboard"\nz = "up"\nangles = "flight"'
+    run = one(tmp_path, "X_N,Y_N,N_Nm", "1000,5,100", sources=tare, frame=frame)
+    assert run["X"] == pytest.approx(-(1000.0 - 500.0 - 30.0 * 4.0))
+    assert run["Y"] == 5.0
+    assert run["N"] == pytest.approx(-120.0)
+    with pytest.raises(InputError, match=r"tare\.2\.tests: 'tow'"):
+        one(tmp_path, "X_N", "1000", sources=tare.replace('"towing"', '"tow"'))
+    with pytest.raises(InputError, match=r"tare\.0\.loads\.X"):
+        one(tmp_path, "X_N", "1000", sources=tare.replace("0.5 kN", "0.5 m"))
+
+
+def test_half_models_are_doubled(tmp_path):
+    half = 'plane = "port_starboard"\nsource = "half body on the wall"'
+    run = one(tmp_path, "X_N,Y_N,Z_N,K_Nm,M_Nm,N_Nm", "1,2,3,4,5,6", half_model=half)
+    assert run[["X", "Z", "M"]].tolist() == [2.0, 6.0, 10.0]
+    assert run[["Y", "K", "N"]].isna().all()
+    assert run["s_Z"] == pytest.approx(2.0 * 0.1 * 3.0)
+    with pytest.raises(InputError, match=r"column beta"):
+        one(tmp_path, "X_N", "1", "a,rotating_arm,hull,ok,tank,2,0,3,25,0.1", half_model=half)
+    upper = half.replace("port_starboard", "upper_lower")
+    run = one(tmp_path, "X_N,Y_N,N_Nm", "1,2,6", "a,rotating_arm,hull,ok,tank,2,0,3,25,0.1", half_model=upper)
+    assert run[["X", "Y", "N"]].tolist() == [2.0, 4.0, 12.0]
+
+
+def test_dimensionless_input_needs_a_speed_and_a_draught(tmp_path):
+    source = '[[source]]\nfiles = "runs.csv"\nnormalisation = "half_rho_Ld"\n'
+    with pytest.raises(InputError, match="draught"):
+        one(tmp_path, "X'", "1", sources=source)
+    with pytest.raises(InputError, match="column U"):
+        one(tmp_path, "X'", "1", "a,pure_rotation,hull,ok,tank,0,,,25,0.1", sources=source.replace("Ld", "L2"))
+    with pytest.raises(InputError, match="half_rho_L2, half_rho_Ld"):
+        one(tmp_path, "X'", "1", sources=source.replace("half_rho_Ld", "mine"))

@@ -1,0 +1,261 @@
+"""Authority: the output formats of the ``forces`` function object, version by version, as its
+source writes them (writeFileHeader, writeForces), and one real run of OpenFOAM v1912.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from made_campaigns import CONSTANTS, STEADY, campaign, history
+
+from ident.campaign import read_campaign
+from ident.readers import openfoam
+from sim.errors import InputError
+
+REAL = Path(__file__).parent / "data" / "openfoam_v1912_plate"
+RNG = np.random.default_rng(7)
+# time, then pressure, viscous and porous force and moment vectors
+TIMES = np.round(np.arange(1, 41) * 0.05, 6)
+FORCE = RNG.standard_normal((40, 3, 3)) + np.array([[5, 3, 1], [0.5, 0.2, 0.1], [0, 0, 0]])
+MOMENT = RNG.standard_normal((40, 3, 3)) + np.array([[1, 2, 30], [0.1, 0.2, 0.3], [0, 0, 0]])
+FORCE[:, 2], MOMENT[:, 2] = 0.0, 0.0
+COFR = "# CofR          : (5.000000e-01 0.000000e+00 0.000000e+00)\n"
+
+
+def vector(v) -> str:
+    return "(" + " ".join(f"{x:.6e}" for x in v) + ")"
+
+
+def grouped(header: str, shares: int, local: bool = False, moving: bool = False, rows=slice(None)) -> str:
+    """``forces.dat`` of the Foundation: bracketed groups, no totals."""
+    text = "# Forces        \n" + ("" if moving else COFR) + f"# Time          {header}\n"
+    for t, f, m in zip(TIMES[rows], FORCE[rows], MOMENT[rows], strict=True):
+        loads = f"\t({' '.join(map(vector, f[:shares]))}) ({' '.join(map(vector, m[:shares]))})"
+        point = vector((0.1 * t, 0, 0)) if moving else ""
+        text += f"{t:<16g}{point}{loads}{loads if local else ''}\n"
+    return text
+
+
+def single(title: str, data, brackets: bool, porous: bool, rows=slice(None)) -> str:
+    """``force.dat`` and ``moment.dat`` of OpenCFD: total first."""
+    shares = ["total", "pressure", "viscous", *(["porous"] if porous else [])]
+    named = [f"{s}_x {s}_y {s}_z" for s in shares]
+    header = "\t".join(f"({n})" if brackets else n for n in named)
+    text = f"# {title:<14}\n{COFR}#\n# Time          \t{header}\n"
+    for t, v in zip(TIMES[rows], data[rows], strict=True):
+        found = [v.sum(axis=0), *v[: 3 if porous else 2]]
+        cells = [vector(x) if brackets else " ".join(f"{y:.8e}" for y in x) for x in found]
+        text += f"{t:<16g}\t{chr(9).join(cells)}\n"
+    return text
+
+
+P3 = "(pressure viscous porous)"
+P2 = "(pressure viscous)"
+VERSIONS = {
+    "Foundation 4, OpenCFD v1606": {"forces.dat": grouped(f"forces{P3} moment{P3}", 3)},
+    "Foundation 8": {"forces.dat": grouped(f"forces{P3}\tmoments{P3}", 3)},
+    "Foundation 8, local system": {
+        "forces.dat": grouped(f"forces{P3}\tmoments{P3}\tlocalForces{P3}\tlocalMoments{P3}", 3, local=True)
+    },
+    "Foundation 11": {"forces.dat": grouped(f"forces{P2}\tmoments{P2}", 2)},
+    "Foundation 11, porous": {"forces.dat": grouped(f"forces{P3}\tmoments{P3}", 3)},
+    "Foundation 13, moving": {"movingForces.dat": grouped(f"CofR\tforces{P2}\tmoments{P2}", 2, moving=True)},
+    "before 2.3": {"forces.dat": grouped("forces(pressure, viscous) moment(pressure, viscous)", 2)},
+    "OpenCFD v1912": {
+        "force.dat": single("Force", FORCE, True, False),
+        "moment.dat": single("Moment", MOMENT, True, False),
+    },
+    "OpenCFD v1912, porous": {
+        "force.dat": single("Force", FORCE, True, True),
+        "moment.dat": single("Moment", MOMENT, True, True),
+    },
+    "OpenCFD v2212": {
+        "force.dat": single("Force", FORCE, False, False),
+        "moment.dat": single("Moment", MOMENT, False, False),
+    },
+    "OpenCFD v2212, porous": {
+        "force.dat": single("Force", FORCE, False, True),
+        "moment.dat": single("Moment", MOMENT, False, True),
+    },
+}
+
+
+def written(folder: Path, files: dict[str, str], start: str = "0") -> Path:
+    (folder / start).mkdir(parents=True, exist_ok=True)
+    for name, text in files.items():
+        (folder / start / name).write_text(text)
+    return folder
+
+
+def read(folder: Path):
+    return np.vstack([values for values, _, _ in openfoam.loads(folder)])
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_every_version_gives_the_same_loads(tmp_path, version):
+    found = read(written(tmp_path, VERSIONS[version]))
+    np.testing.assert_allclose(found[:, 0], TIMES)
+    np.testing.assert_allclose(found[:, 1:4], FORCE.sum(axis=1), atol=1e-5)
+    np.testing.assert_allclose(found[:, 4:], MOMENT.sum(axis=1), atol=1e-4)
+
+
+def test_moving_point_is_the_column(tmp_path):
+    found = list(openfoam.loads(written(tmp_path, VERSIONS["Foundation 13, moving"])))
+    np.testing.assert_allclose(np.vstack([c for _, c, _ in found])[:, 0], 0.1 * TIMES, rtol=1e-6)
+    assert all(moving for _, _, moving in found)
+
+
+def test_columns_are_found_by_header_not_by_position(tmp_path):
+    """Porous before viscous in both header and rows: the sums stay."""
+    text = grouped("forces(porous pressure viscous)\tmoments(porous pressure viscous)", 3)
+    np.testing.assert_allclose(read(written(tmp_path, {"forces.dat": text}))[:, 1:4], FORCE.sum(axis=1), atol=1e-5)
+
+
+@pytest.mark.parametrize("version", ["Foundation 11", "OpenCFD v1912", "OpenCFD v2212"])
+def test_a_later_start_wins(tmp_path, version):
+    """Run 0-2 s, restarted at 1 s with other loads: the first run counts to 1 s only."""
+    later, brackets = slice(19, 40), version.endswith("1912")
+    first = {
+        "forces.dat": VERSIONS["Foundation 11"]["forces.dat"].replace("e+00", "e+01"),
+        "force.dat": single("Force", 10.0 * FORCE, brackets, False),
+        "moment.dat": single("Moment", 10.0 * MOMENT, brackets, False),
+    }
+    scaled = {
+        "forces.dat": grouped(f"forces{P2}\tmoments{P2}", 2, rows=later),
+        "force.dat": single("Force", FORCE, brackets, False, rows=later),
+        "moment.dat": single("Moment", MOMENT, brackets, False, rows=later),
+    }
+    written(tmp_path, {k: first[k] for k in VERSIONS[version]}, "0")
+    for name in VERSIONS[version]:
+        written(tmp_path, {name: scaled[name]}, "1")
+    found = read(tmp_path)
+    np.testing.assert_allclose(found[:, 0], TIMES)
+    np.testing.assert_allclose(found[19:, 1:4], FORCE[19:].sum(axis=1), atol=1e-5)
+    assert np.abs(found[:19, 1] - FORCE[:19].sum(axis=1)[:, 0]).max() > 1.0
+
+
+def test_repeated_times_and_steps_back_keep_the_last(tmp_path):
+    first = grouped(f"forces{P2}\tmoments{P2}", 2, rows=slice(0, 30)).replace("e+00", "e+02")
+    again = "".join(grouped("", 2, rows=slice(20, 40)).splitlines(keepends=True)[3:])
+    twice = again.splitlines(keepends=True)[-1]
+    found = read(written(tmp_path, {"forces.dat": first + again + twice}))
+    np.testing.assert_allclose(found[:, 0], TIMES)
+    np.testing.assert_allclose(found[20:, 1:4], FORCE[20:].sum(axis=1), atol=1e-5)
+
+
+def test_a_restart_at_the_same_start_is_read_after_the_first(tmp_path):
+    written(tmp_path, {"forces.dat": grouped(f"forces{P2}\tmoments{P2}", 2, rows=slice(0, 25))})
+    written(tmp_path, {"forces_1.dat": grouped(f"forces{P2}\tmoments{P2}", 2, rows=slice(20, 40))})
+    np.testing.assert_allclose(read(tmp_path)[:, 0], TIMES)
+
+
+COEFFICIENTS = "# Force coefficients\n# liftDir : (0 1 0)\n# Time\tCd\tCs\tCl\n0.1\t1\t2\t3\n"
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "words"),
+    [
+        ("forces.dat", COEFFICIENTS, "force coefficients"),
+        ("forces.dat", VERSIONS["Foundation 11"]["forces.dat"].replace("viscous", "turbulent"), "unknown header"),
+        ("forces.dat", VERSIONS["Foundation 11"]["forces.dat"].replace("moments", "torques"), "unknown header"),
+        ("forces.dat", grouped(f"forces{P3} moment{P3}\tlocalForces(pressure,viscous,porous) "
+                               "localMoments(pressure,viscous,porous)", 3), "local system"),
+        ("forces.dat", VERSIONS["Foundation 11"]["forces.dat"].replace("# Time", "# Iteration"), "no line '# Time"),
+        ("forces.dat", VERSIONS["Foundation 11"]["forces.dat"].replace(COFR, ""), "CofR"),
+        ("forces.dat", VERSIONS["Foundation 11"]["forces.dat"].replace(P2, P3), "cells"),
+        ("forces.dat", VERSIONS["Foundation 11"]["forces.dat"][:-20], "cut short"),
+        ("forces.dat", "# Forces\n" + COFR + f"# Time forces{P2}\tmoments{P2}\n", "no rows"),
+        ("force.dat", VERSIONS["OpenCFD v2212"]["force.dat"], "force.dat"),
+    ],
+)  # fmt: skip
+def test_a_header_nobody_listed_is_refused_with_its_place(tmp_path, name, text, words):
+    written(tmp_path, {name: text})
+    with pytest.raises(InputError, match=r"dat|1 function") as caught:
+        read(tmp_path)
+    assert words in str(caught.value)
+    assert caught.value.allowed
+
+
+def test_totals_that_are_not_their_shares_are_refused(tmp_path):
+    swapped = VERSIONS["OpenCFD v1912"]["force.dat"].replace("pressure_", "@").replace("total_", "pressure_")
+    for bad in (swapped.replace("@", "total_"), VERSIONS["OpenCFD v1912"]["force.dat"].replace("(6.", "(1.")):
+        files = {"force.dat": bad, "moment.dat": VERSIONS["OpenCFD v1912"]["moment.dat"]}
+        with pytest.raises(InputError, match=r"total|header"):
+            read(written(tmp_path, files))
+
+
+def test_force_and_moment_of_different_times_are_refused(tmp_path):
+    files = dict(VERSIONS["OpenCFD v2212"])
+    files["moment.dat"] = files["moment.dat"].replace("0.55 ", "0.56 ")
+    with pytest.raises(InputError, match="same times"):
+        read(written(tmp_path, files))
+
+
+# -- the whole way, on the real run ----------------------------------------------------------
+
+SOURCE = '[[source]]\nfiles = "run"\nrows = "history"\n'
+PARTS = '[source.parts]\nforcesPlate = "hull"\nforcesRudder = "stern_plane_1"\n'
+STATE = CONSTANTS.replace('part = "hull"\n', "").replace('"2 m/s"', '"1 m/s"').replace('"5 deg"', '"-8 deg"')
+MESH = {"frame": 'x = "aft"\ny = "starboard"\nz = "up"\nangles = "flight"'}
+
+
+@pytest.fixture
+def run(tmp_path):
+    (tmp_path / "c").mkdir()
+    (tmp_path / "c" / "run").symlink_to(REAL)
+    return tmp_path / "c"
+
+
+def test_real_run_gives_a_row_a_part_in_the_program_frame(run):
+    keys = "rho_inf = 1.0\nvehicle_origin = [0.5, 0.0, 0.0]\n"
+    found = read_campaign(campaign(run, SOURCE + keys + PARTS + STATE + STEADY, **MESH)).runs
+    assert found["part"].tolist() == ["hull", "stern_plane_1"]
+    last = {o: np.loadtxt(REAL / "postProcessing" / o / "1" / "force.dat", comments="#", dtype=str)[-1] for o in
+            ("forcesPlate", "forcesRudder")}  # fmt: skip
+    # Kinematic loads times 1000 kg/m3; x aft and z up turn; close to the last step's total.
+    assert found["X"][0] == pytest.approx(-1000.0 * float(last["forcesPlate"][1].strip("(")), rel=0.05)
+    assert found["Y"][0] == pytest.approx(1000.0 * float(last["forcesPlate"][2]), rel=0.1)
+    assert found["Y"][0] / -np.sin(np.radians(8.0)) < 0.0
+    assert (found["s_Y"] > 0.0).all()
+    assert found["reduction"].str.contains("effective samples").all()
+    assert found["converged"].tolist() == [False, False]
+
+
+def test_moments_are_moved_from_cofr_to_the_campaigns_point(run):
+    """CofR at x = 0.5 m of the mesh: about the mesh origin N grows by 0.5 Y."""
+    rows = []
+    for origin in ("[0.5, 0.0, 0.0]", "[0.0, 0.0, 0.0]"):
+        keys = f"rho_inf = 1000.0\nvehicle_origin = {origin}\n"
+        rows.append(read_campaign(campaign(run, SOURCE + keys + PARTS + STATE + STEADY, **MESH)).runs.iloc[0])
+    # In the program frame x points the other way, and so does N about z down.
+    assert rows[1]["N"] == pytest.approx(rows[0]["N"] - 0.5 * rows[0]["Y"], rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("source", "words"),
+    [
+        (SOURCE + PARTS + STATE + STEADY, "rho_inf"),
+        (SOURCE + "rho_inf = 1.0\n" + STATE + STEADY, "source.parts"),
+        (SOURCE + "rho_inf = 1.0\n" + PARTS.replace("Rudder", "Sail") + STATE + STEADY, "forcesSail"),
+        (SOURCE.replace('"run"', '"run/postProcessing/forcesPlate/0/force.dat"') + STATE + STEADY, "restarts"),
+        (SOURCE.replace('"run"', '"run/case"') + "rho_inf = 1.0\n" + STATE + STEADY, "no output of forces"),
+    ],
+)
+def test_what_the_campaign_does_not_say_is_asked_for(run, source, words):
+    with pytest.raises(InputError) as caught:
+        read_campaign(campaign(run, source, **MESH))
+    assert words in str(caught.value)
+
+
+def test_a_case_of_force_coefficients_alone_is_refused(tmp_path):
+    written(tmp_path / "run" / "postProcessing" / "coeffs", {"coefficient.dat": COEFFICIENTS})
+    with pytest.raises(InputError, match=r"coefficient\.dat \(allowed: .*coefficients are not read"):
+        read_campaign(campaign(tmp_path, SOURCE + "rho_inf = 1.0\n" + STATE + STEADY, **MESH))
+
+
+def test_one_function_object_needs_no_part_map(run):
+    source = history("run/postProcessing/forcesPlate", 'reader = "openfoam"\nrho_inf = 1.0')
+    found = read_campaign(campaign(run, source, **MESH)).runs
+    assert found["run_id"].tolist() == ["forcesPlate"]
