@@ -164,6 +164,7 @@ COEFFICIENTS = "# Force coefficients\n# liftDir : (0 1 0)\n# Time\tCd\tCs\tCl\n0
                                "localMoments(pressure,viscous,porous)", 3), "local system"),
         ("forces.dat", VERSIONS["Foundation 11"]["forces.dat"].replace("# Time", "# Iteration"), "no line '# Time"),
         ("forces.dat", VERSIONS["Foundation 11"]["forces.dat"].replace(COFR, ""), "CofR"),
+        ("forces.dat", VERSIONS["Foundation 11"]["forces.dat"].replace("(5.0", "(5.0.0"), "CofR"),
         ("forces.dat", VERSIONS["Foundation 11"]["forces.dat"].replace(P2, P3), "cells"),
         ("forces.dat", VERSIONS["Foundation 11"]["forces.dat"][:-20], "cut short"),
         ("forces.dat", "# Forces\n" + COFR + f"# Time forces{P2}\tmoments{P2}\n", "no rows"),
