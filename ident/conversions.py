@@ -15,7 +15,7 @@ import numpy as np
 import pandas as pd
 
 from ident.campaign_file import CampaignFile, Tare
-from ident.quantities import HARMONICS, PRIMED, factor
+from ident.quantities import PRIMED, factor
 from sim.catalogue import ACCELERATIONS, OUTPUTS
 from sim.errors import InputError
 from sim.forces import body_velocity
@@ -297,10 +297,3 @@ def standard_errors(runs: pd.DataFrame, header: CampaignFile, length: float) -> 
         both = ((given**2 + ruled.fillna(0.0) ** 2) ** 0.5).where(reduced, given)
         out[f"s_{name}"] = both.where(given.notna(), ruled)
     return out
-
-
-def bare(quantity: str) -> str:
-    """The load that ``X_in`` or ``s_X`` belongs to, else the quantity itself."""
-    own = quantity.removeprefix("s_")
-    stem, _, tail = own.partition("_")
-    return stem if tail in HARMONICS else own

@@ -138,7 +138,7 @@ def reduce(channels: Channels, rule: Reduction, run_id: str, frequency: float | 
         raise InputError(str(channels.path), f"{error} in {condensed.samples} rows", text) from error
     reduced = Reduced(run_id, channels.path.name, names, rule.kind, fit)
     if rule.kind == "oscillatory":
-        return _harmonic_values(names, fit, frequency or 0.0, math.radians(rule.phase_deg)), reduced
+        return _harmonic_values(names, fit, frequency or 0.0), reduced
     values: dict[str, Any] = {}
     for c, name in enumerate(names):
         values[name] = float(fit.values[0, c])
@@ -166,7 +166,7 @@ def _regressors(channels: Channels, rule: Reduction, frequency: float | None) ->
     return condense.powers(first + half, half), half
 
 
-def _harmonic_values(names: list[str], fit: reduction.Fitted, frequency: float, phase: float) -> dict[str, Any]:
+def _harmonic_values(names: list[str], fit: reduction.Fitted, frequency: float) -> dict[str, Any]:
     """Harmonics in the phase of the displacement, which a channel may measure."""
     shift, values = 0.0, {}
     if "displacement" in names:

@@ -84,7 +84,8 @@ def read_layout(path: Path) -> Layout:
         raise InputError(where, "force coefficients (forceCoeffs)", allowed)
     rest = re.sub(r"^#\s*Time\s*", "", text)
     centre = next((m for _, t in comments if (m := _COFR.match(t))), None)
-    point = np.array(centre[1].strip("()").split(), dtype=float) if centre else None
+    found = [_PLAIN.number(cell) for cell in centre[1].strip("() ").split()] if centre else []
+    point = np.array(found, dtype=float) if found and None not in found else None
     if _GROUP.search(rest):
         return _grouped(where, rest, point)
     return _single(where, rest, title, point)

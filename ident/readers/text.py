@@ -9,6 +9,7 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -24,6 +25,8 @@ LARGEST = 1e15
 _CHUNK = 1 << 20
 _LONGEST = 1 << 18
 _HEAD = 200
+# Before version 3, pandas rounded the last digit unless told not to.
+_EXACT: dict[str, Any] = {} if int(pd.__version__.split(".")[0]) >= 3 else {"float_precision": "round_trip"}
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eEdD][+-]?\d{1,3})?", re.ASCII)
 ENCODINGS = ("utf-8", "latin-1")
 COMMENTS = ("#", "%", "!")
@@ -253,7 +256,7 @@ def numbers(path: Path, block: Lines, dialect: Dialect, wanted: list[int], names
                 skipinitialspace=True,
                 keep_default_na=False,
                 skip_blank_lines=False,
-                float_precision="round_trip",
+                **_EXACT,
             )
         except (ValueError, OverflowError):
             frame = None
