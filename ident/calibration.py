@@ -53,14 +53,15 @@ class Prior(Data):
     """What is known of a multiplier or offset before any maneuver.
 
     ``captive``: one (or no offset) within the captive error of the group. ``carry_over``: the
-    vortex-lattice factor on force or roll moment of the plane geometry. ``stated``: mean
-    and sigma with their reason. ``sigma`` widens the others where given.
+    vortex-lattice factor on force or roll moment of the plane geometry. ``tail_downwash``:
+    factor on force or pitch moment of the sail planes by their vortices at the stern planes.
+    ``stated``: mean and sigma with their reason. ``sigma`` widens the others where given.
     """
 
-    method: Literal["captive", "carry_over", "stated"]
+    method: Literal["captive", "carry_over", "tail_downwash", "stated"]
     mean: float | None = None
     sigma: Positive | None = None
-    of: Literal["force", "roll"] = "force"
+    of: Literal["force", "roll", "pitch"] = "force"
     source: str
 
     @model_validator(mode="after")
@@ -206,22 +207,33 @@ def captive_sigma(rows: pd.DataFrame, chosen: Mask, kind: str) -> float:
     return float(np.linalg.norm(error)) / size if size > 0.0 else 0.0
 
 
-def _prior(group: Group, captive: float, vehicle: Vehicle, where: str) -> tuple[float, float, str]:
-    prior = group.prior
-    neutral = 1.0 if group.kind == "multiplier" else 0.0
-    mean, sigma, method = neutral, captive, "captive standard error"
-    if prior.method == "carry_over":
-        from ident.carry_over import carry_over
+def _estimated(prior: Prior, vehicle: Vehicle, rows: pd.DataFrame) -> tuple[float, float, str]:
+    """Mean, standard deviation and method of an estimate from the geometry."""
+    from ident.carry_over import carry_over
 
-        found = carry_over(vehicle)
-        force = prior.of == "force"
-        mean = found.force_factor if force else found.roll_factor / found.force_factor
-        sigma, method = (found.force_sigma if force else found.roll_sigma), found.method
-        sigma = float(np.hypot(sigma, captive))
-    elif prior.method == "stated":
+    planes = carry_over(vehicle)
+    if prior.method == "carry_over":
+        if prior.of == "force":
+            return planes.force_factor, planes.force_sigma, planes.method
+        return planes.roll_factor / planes.force_factor, planes.roll_sigma / planes.force_factor, planes.method
+    from ident.downwash import tail_downwash
+
+    tail = tail_downwash(vehicle, rows, planes.force_factor)
+    if prior.of == "force":
+        return tail.force_factor, tail.force_sigma, tail.method
+    return tail.moment_factor, tail.moment_sigma, tail.method
+
+
+def _prior(group: Group, captive: float, vehicle: Vehicle, rows: pd.DataFrame, where: str) -> tuple[float, float, str]:
+    prior = group.prior
+    mean, sigma, method = 1.0 if group.kind == "multiplier" else 0.0, captive, "captive standard error"
+    if prior.method == "stated":
         mean, sigma, method = float(prior.mean or 0.0), float(prior.sigma or 0.0), "stated"
-    if prior.sigma is not None:
-        sigma = max(sigma, prior.sigma) if prior.method != "stated" else prior.sigma
+    elif prior.method != "captive":
+        mean, spread, method = _estimated(prior, vehicle, rows)
+        sigma = float(np.hypot(spread, mean * captive))
+    if prior.sigma is not None and prior.method != "stated":
+        sigma = max(sigma, prior.sigma)
     if sigma <= 0.0:
         raise InputError(f"{where}, group {group.name}", "a prior without any spread", "prior.sigma, positive")
     return mean, sigma, method
@@ -246,7 +258,7 @@ def parameters(spec: CalibrationFile, vehicle: Vehicle, rows: pd.DataFrame, wher
         chosen = _rows_of(group, rows, where)
         _whole_estimates(group, rows, chosen, where)
         captive = captive_sigma(rows, chosen, group.kind)
-        mean, sigma, method = _prior(group, captive, vehicle, where)
+        mean, sigma, method = _prior(group, captive, vehicle, rows, where)
         found.append(Parameter(group, chosen, mean, sigma, captive, method))
     return found
 

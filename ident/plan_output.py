@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
-from ident.campaign import Campaign, _to_full_scale, _turn
+from ident.campaign import Campaign, to_full_scale, turn
 from ident.findings import STATE
 from ident.plan import Plan
 from sim.errors import InputError
@@ -24,7 +24,7 @@ _UNITS = {"U": "mps", "D0": "m", "p": "radps", "q": "radps", "r": "radps", "n": 
 def matrix(plan: Plan, campaign: Campaign) -> pd.DataFrame:
     """The test matrix in the campaign's frame and scale, units in the header."""
     frame = campaign.header.frame.frame
-    table = _to_full_scale(_turn(plan.runs, frame), 1.0 / campaign.header.scale.ratio)
+    table = to_full_scale(turn(plan.runs, frame, campaign.header.frame.angles), 1.0 / campaign.header.scale.ratio)
     out = pd.DataFrame(
         {"run_id": [f"P{i + 1:03d}" for i in range(len(table))], "test": table["test"], "part": table["part"]}
     )
