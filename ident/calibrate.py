@@ -2,12 +2,13 @@
 
 Maximum a posteriori by least squares. A series k (case, source, channel) with residual r_k
 adds ``n_k mean(r_k^2) / sigma_k^2``; n_k is the number of independent pieces the record
-holds (crossings of its mean, plus one), and::
+holds (crossings of its mean, plus one), shared among the channels of one motion (heading,
+yaw rate and track are one motion), and::
 
     sigma_k^2 = s_c^2 + reading_k^2 + d_k^2
 
-with the reading error of the record, the difference d_k to the better source a record was
-validated against, and the discrepancy s_c between model and reality: one for each case and
+with the reading error of the record, its share d_k of the difference to another source of the
+same case, and the discrepancy s_c between model and reality: one for each case and
 channel, shared by its sources, estimated by maximum likelihood in turn with the multipliers.
 """
 
@@ -42,8 +43,17 @@ _ROUNDS = 12
 _INNER = 6
 # A flight that ends early is this many times the record's size away from it.
 _LOST = 10.0
+# Channels that follow from one another: what one says of a source, the others say again.
+_MOTIONS = (
+    ("psi", "r", "y", "x"),
+    ("theta", "q", "z", "D0", "dz_over_L0", "w"),
+    ("phi", "p"),
+    ("u", "U", "u_over_U0", "n"),
+)
 # Residual samples of a series; enough for the fastest oscillation of a maneuver.
 _SAMPLES = 240
+# Sources that differ by this many of their reading errors contradict one another.
+_FAR = 3.0
 
 
 @dataclass(frozen=True)
@@ -56,7 +66,7 @@ class Channel:
     along, value : Abscissa [s or m] and reference values in its unit.
     degrees : True when the unit is in degrees.
     reading : Standard error of reading.
-    against : Root mean square difference to the source it was validated against, or zero.
+    against : Its share of the root mean square difference to another source, or zero.
     pieces : Independent pieces of the record.
     from_start : Compare changes since the start.
     """
@@ -67,7 +77,7 @@ class Channel:
     degrees: bool
     reading: float
     against: float
-    pieces: int
+    pieces: float
     from_start: bool
 
     def residual(self, flown: Simulation, abscissa: str) -> Array:
@@ -169,21 +179,31 @@ def pieces(value: Array) -> int:
     return max(2, 1 + int(np.count_nonzero(centred[:-1] * centred[1:] < 0.0)))
 
 
+def _sharing(channel: str, used: Sequence[str]) -> int:
+    """How many of a source's channels describe the motion of this one."""
+    motion = next((m for m in _MOTIONS if channel in m), (channel,))
+    return sum(other in motion for other in used)
+
+
+def _gap(x: Array, y: Array, other_x: Array, other_y: Array) -> float:
+    """Root mean square difference of two records where both exist."""
+    at = np.linspace(max(x[0], other_x[0]), min(x[-1], other_x[-1]), _SAMPLES)
+    return float(np.sqrt(np.mean((np.interp(at, x, y) - np.interp(at, other_x, other_y)) ** 2)))
+
+
 def _difference(one: tuple[Array, Array, str], other: tuple[Array, Array, str]) -> float:
     """Root mean square difference of two records where both exist, in the unit of the first."""
-    start, end = max(one[0][0], other[0][0]), min(one[0][-1], other[0][-1])
-    at = np.linspace(start, end, _SAMPLES)
-    gap = np.interp(at, one[0], one[1]) - np.interp(at, other[0], other[1])
-    return float(np.sqrt(np.mean(gap**2)))
+    return _gap(one[0], one[1], other[0], other[1])
 
 
-def _channel(training: Training, reference: Series, name: str, channel: str) -> Channel:
+def _channel(training: Training, reference: Series, name: str, channel: str, used: Sequence[str]) -> Channel:
     along, value, unit = reference[training.source][channel]
     at = np.linspace(along[0], along[-1], _SAMPLES)
     sigma = reference.sigma.get(training.source, {}).get(channel)
     against = 0.0
-    if training.validated_against and channel in reference[training.validated_against]:
-        against = _difference(reference[training.source][channel], reference[training.validated_against][channel])
+    if training.differs_from and channel in reference[training.differs_from]:
+        gap = _difference(reference[training.source][channel], reference[training.differs_from][channel])
+        against = gap * training.share**0.5
     return Channel(
         key=(name, training.source, channel),
         along=at,
@@ -191,7 +211,7 @@ def _channel(training: Training, reference: Series, name: str, channel: str) -> 
         degrees=unit.startswith("deg"),
         reading=float(np.sqrt(np.mean(sigma**2))) if sigma is not None else 0.0,
         against=against,
-        pieces=pieces(np.interp(at, along, value)),
+        pieces=pieces(np.interp(at, along, value)) / _sharing(channel, used),
         from_start=channel in training.from_start,
     )
 
@@ -226,14 +246,15 @@ def problem(
         check_reference(case, reference, place)
         if case.vehicle != vehicle.name:
             raise _refuse(where, training, "case", f"a case of {case.vehicle}", [f"a case of {vehicle.name}"])
-        for key, source in (("source", training.source), ("validated_against", training.validated_against)):
+        for key, source in (("source", training.source), ("differs_from", training.differs_from)):
             if source and source not in reference.data:
                 raise _refuse(where, training, key, source, list(reference.data))
         known = [c for c in case.reference.channels if c in reference[training.source]] if case.reference else []
-        for channel in training.channels or known:
+        used = training.channels or known
+        for channel in used:
             if channel not in known:
                 raise _refuse(where, training, "channels", channel, known)
-            channels.append(_channel(training, reference, case.name, channel))
+            channels.append(_channel(training, reference, case.name, channel, used))
         cases[case.name] = (case, reference.abscissa)
     return Problem(vehicle, rows, chosen, cases, channels)
 
@@ -346,3 +367,18 @@ def calibrate(
         converged,
         rounds,
     )
+
+
+def contradictions(task: Problem) -> list[str]:
+    """Sources of one case and channel that differ by more than their stated errors allow."""
+    said = []
+    for i, one in enumerate(task.channels):
+        for other in task.channels[:i]:
+            if (one.key[0], one.key[2]) != (other.key[0], other.key[2]):
+                continue
+            rms = _gap(one.along, one.value, other.along, other.value)
+            stated = float(np.hypot(one.reading, other.reading))
+            if rms > _FAR * max(stated, 1e-12 * float(np.abs(one.value).max())):
+                text = f"{other.key[1]} and {one.key[1]} of {one.key[0]} differ in {one.key[2]} by {rms:.3g}"
+                said.append(f"contradictory data: {text}, {rms / max(stated, 1e-12):.0f} times their reading errors")
+    return said

@@ -37,15 +37,17 @@ ALLOWED = 2.0
 class Training(Data):
     """One source of one case that the calibration learns from.
 
-    ``validated_against`` names a better source of the same case: the difference between the
-    two then counts as this source's own uncertainty, channel by channel. ``from_start`` lists
-    channels that are changes since the start, whatever offset their record begins with.
+    ``differs_from`` names another source of the same case; ``share`` of the mean squared
+    difference between the two counts as this source's own variance, channel by channel.
+    ``from_start`` lists channels that are changes since the start, whatever offset their
+    record begins with.
     """
 
     case: str
     source: str
     channels: list[str] | None = None
-    validated_against: str | None = None
+    differs_from: str | None = None
+    share: Annotated[float, Field(ge=0, le=1)] = 0.5
     from_start: list[str] = Field(default_factory=list)
 
 
@@ -197,14 +199,14 @@ def _whole_estimates(group: Group, rows: pd.DataFrame, chosen: Mask, where: str)
 def captive_sigma(rows: pd.DataFrame, chosen: Mask, kind: str) -> float:
     """Captive standard error of a group as one multiplier or offset.
 
-    All errors of the group are taken as one, so nothing averages out: the norm of the
-    standard errors over the norm of the values (multiplier), or their root mean square.
+    As if the group held one value only, of its mean information: all errors are taken as
+    one, and nothing averages out. Values without a stated error do not count.
     """
     error, value = rows["stderr"].to_numpy()[chosen], rows["value"].to_numpy()[chosen]
-    if kind == "offset":
-        return float(np.sqrt(np.mean(error**2)))
-    size = float(np.linalg.norm(value))
-    return float(np.linalg.norm(error)) / size if size > 0.0 else 0.0
+    known = error > 0.0
+    size = np.abs(value[known]) if kind == "multiplier" else 1.0
+    information = float(np.mean((size / error[known]) ** 2)) if known.any() else 0.0
+    return information**-0.5 if information > 0.0 else 0.0
 
 
 def _estimated(prior: Prior, vehicle: Vehicle, rows: pd.DataFrame) -> tuple[float, float, str]:
@@ -218,7 +220,7 @@ def _estimated(prior: Prior, vehicle: Vehicle, rows: pd.DataFrame) -> tuple[floa
         return planes.roll_factor / planes.force_factor, planes.roll_sigma / planes.force_factor, planes.method
     from ident.downwash import tail_downwash
 
-    tail = tail_downwash(vehicle, rows, planes.force_factor)
+    tail = tail_downwash(vehicle, rows, planes)
     if prior.of == "force":
         return tail.force_factor, tail.force_sigma, tail.method
     return tail.moment_factor, tail.moment_sigma, tail.method

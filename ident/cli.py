@@ -299,6 +299,33 @@ def _all(db: str, version: int | None, cases: Path | None, console: Any) -> tupl
 
 
 @main.command()
+@click.argument("name", default="bb2")
+@DB
+@VERSION
+@click.option("-m", "--message", default="", help="Message stored with the version.")
+@click.option("--left-out/--no-left-out", default=True, show_default=True, help="Repeat without each source in turn.")
+@click.option("--json", "json_path", default=None, metavar="PATH|-", help="Write priors, posteriors and diagnostics.")
+def calibrate(name: str, db: str, version: int | None, message: str, left_out: bool, json_path: str | None) -> None:
+    """Estimate multipliers of coefficient groups from free-running maneuvers.
+
+    NAME is a bundled calibration or a path to a file. Commits a new version whose parent is the
+    captive one it started from (the latest, or --version).
+
+    \b
+    Example: ident calibrate bb2
+             ident calibrate my_boat.toml --no-left-out --json -
+    """
+    from ident.calibrated import run, show
+
+    console = _console(quiet=json_path == "-")
+    with console.status("calibrating") as status:
+        done = run(name, db, version, message, left_out, each=status.update)
+    show(done, console)
+    if json_path:
+        _emit({**done.summary, "version": done.version, "new": done.new, "digest": done.digest}, json_path)
+
+
+@main.command()
 @DB
 @VERSION
 @click.option("--vehicle", default="bb2", show_default=True, help="Bundled vehicle name, or path to a vehicle file.")

@@ -1,10 +1,11 @@
-"""What the trailing vortices of deflected sail planes do to the stern planes.
+"""What deflected sail planes load beside themselves: their roots, and the stern planes behind.
 
 Sail planes leave a pair of vortices, pi/4 of their span apart (elliptic loading), that trail
 straight aft and pass over the stern planes. Their circulation follows from the measured
 lift of the sail planes by Kutta and Joukowsky, their velocity at the stern planes by Biot
 and Savart (Katz and Plotkin, Low-Speed Aerodynamics, ch. 2); the stern planes answer with
-their measured lift. The campaign measured each plane alone, so this is in none of its runs.
+their measured lift. This is the wing-tail interference of Pitts, Nielsen and Kaattari (1957,
+NACA Report 1307). The campaign measured each plane alone, so it is in none of its runs.
 """
 
 from __future__ import annotations
@@ -22,22 +23,24 @@ from sim.surface import Geometry
 from sim.vehicle import Vehicle, read_toml
 
 if TYPE_CHECKING:
+    from ident.carry_over import CarryOver
     from sim.vehicle import Plane
 
 Array = NDArray[np.float64]
 
 # Elliptic loading: distance of the rolled-up vortices over the span.
 _ROLLED_UP = np.pi / 4.0
-# The pair may be as far apart as the tips, or lie on the local flow instead of straight aft;
-# the relative standard deviation allows for both.
-_RELATIVE_SIGMA = 0.3
+# Relative standard deviation. The pair may be as far apart as the tips, or lie on the local
+# flow instead of straight aft (0.3); and, as in NACA Report 1307, the loads it induces on the
+# hull before the tail are left out, which act against those on the tail and may be of their size.
+_RELATIVE_SIGMA = 0.7
 # Deflections [deg] between which the lift slopes are taken: before any stall.
 _LINEAR_DEG = 10.0
 
 
 @dataclass(frozen=True)
 class TailDownwash:
-    """Factors on the sail planes' own loads that include what they do to the stern planes.
+    """Factors on the sail planes' own loads that include their fixed roots and the stern planes.
 
     Attributes
     ----------
@@ -126,14 +129,14 @@ def _coefficient_changes(
     return own, added, incidence
 
 
-def tail_downwash(vehicle: Vehicle, rows: pd.DataFrame, tail_factor: float) -> TailDownwash:
+def tail_downwash(vehicle: Vehicle, rows: pd.DataFrame, planes: CarryOver) -> TailDownwash:
     """Factors on the sail planes' loads by their downwash on the stern planes.
 
     Parameters
     ----------
     vehicle : With planes ``sail_planes`` and ``stern_plane...`` and their geometry.
     rows : Captive database rows, for the measured lift slopes (deepest, fastest runs).
-    tail_factor : Load of a stern plane with what it carries over, on its own load.
+    planes : What stern and sail planes carry over to their roots and the hull.
 
     Raises
     ------
@@ -144,16 +147,18 @@ def tail_downwash(vehicle: Vehicle, rows: pd.DataFrame, tail_factor: float) -> T
     tails = [p for p in vehicle.planes if p.name.startswith("stern_plane")]
     if not sails or not tails:
         raise InputError(f"vehicle {vehicle.name}", "no sail planes or no stern planes", "both, for a tail downwash")
-    planes = rows[rows["part"] == "sail_planes"]
-    at = (float(planes["depth_m"].max()), float(planes["speed_mps"].max()))
+    runs = rows[rows["part"] == "sail_planes"]
+    at = (float(runs["depth_m"].max()), float(runs["speed_mps"].max()))
     half = _ROLLED_UP * _tip(vehicle)
     own, added, incidence = _coefficient_changes(rows, tails, sails[0], half, vehicle.particulars.length.value, at)
-    change = {k: tail_factor * added[k] / own[k] for k in added}
+    change = {k: planes.force_factor * added[k] / own[k] for k in added}
+    factor = {k: planes.sail_factor * (1.0 + x) for k, x in change.items()}
+    sigma = {k: float(np.hypot(abs(x) * _RELATIVE_SIGMA, planes.sail_sigma)) for k, x in change.items()}
     return TailDownwash(
-        force_factor=1.0 + change["Z"],
-        force_sigma=abs(change["Z"]) * _RELATIVE_SIGMA,
-        moment_factor=1.0 + change["M"],
-        moment_sigma=abs(change["M"]) * _RELATIVE_SIGMA,
+        force_factor=factor["Z"],
+        force_sigma=sigma["Z"],
+        moment_factor=factor["M"],
+        moment_sigma=sigma["M"],
         incidence_deg={k: v * _LINEAR_DEG for k, v in incidence.items()},
-        method="trailing vortex pair of the sail planes (elliptic loading, Biot-Savart) at the stern planes",
+        method="fixed roots by vortex lattice on the sail's wall; trailing vortex pair (elliptic loading) at the stern planes",
     )

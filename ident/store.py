@@ -46,7 +46,7 @@ def database_rows(found: Identification) -> pd.DataFrame:
     columns = {axis: column for column, axis in axis_columns().items()}
     factor = {k: q.factor for k, q in found.campaign.header.quality.items()}
     stderr = np.sqrt(np.clip(np.diag(found.covariance), 0.0, None))
-    correlated = _correlations(found.covariance, stderr)
+    correlated = correlation_texts(found.covariance, stderr)
     rows = []
     for term in vehicle_terms(vehicle):
         for part in parts_of(term, vehicle):
@@ -67,6 +67,7 @@ def database_rows(found: Identification) -> pd.DataFrame:
                     "n_runs": len(set(node.runs)) if sign else 0,
                     "quality": max(node.qualities, key=lambda q: factor[q]) if sign else "",
                     "origin": origin if sign else "symmetry",
+                    "calibration": "",
                     "estimate": index if sign else -1,
                     "correlation": correlated.get(index, "") if sign else "",
                     "worst_residual": node.worst if sign else 0.0,
@@ -85,8 +86,17 @@ def database_rows(found: Identification) -> pd.DataFrame:
     return table
 
 
-def _correlations(covariance: Array, stderr: Array) -> dict[int, str]:
-    """Estimate -> the estimates correlated with it, as text."""
+def correlation_texts(covariance: Array, stderr: Array) -> dict[int, str]:
+    """Estimate -> the estimates correlated with it, as text.
+
+    Parameters
+    ----------
+    covariance, stderr : (n, n) and (n,) of the estimates.
+
+    Returns
+    -------
+    Number of an estimate -> ``other:coefficient`` pairs; estimates without any are left out.
+    """
     scale = np.outer(stderr, stderr)
     matrix = np.divide(covariance, scale, out=np.zeros_like(covariance), where=scale > 0.0)
     np.fill_diagonal(matrix, 0.0)
@@ -170,7 +180,12 @@ def _commit(path: str, rows: pd.DataFrame, metadata: dict[str, str]) -> tuple[in
         parent, number = _latest(path, vehicle, content)
         if number is not None:
             return number, False
-        own = {"digest": content, "program": f"ident {__version__}", "parent": parent, "vehicle": vehicle}
+        own = {
+            "digest": content,
+            "program": f"ident {__version__}",
+            "parent": metadata.get("parent", parent),
+            "vehicle": vehicle,
+        }
         properties = CommitProperties(custom_metadata={**metadata, **own})
         try:
             if parent:

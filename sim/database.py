@@ -28,6 +28,7 @@ COLUMNS = {
     "n_runs": "number of runs behind the value",
     "quality": "worst quality word among those runs",
     "origin": "measured, published (given as a coefficient), mirror (port/starboard image) or symmetry (zero by it)",
+    "calibration": "group=multiplier of every calibration in force, empty for captive values",
     "estimate": "values with the same number are one estimate",
     "correlation": "estimate:coefficient of every estimate whose error is correlated with this one's",
     "worst_residual": "largest disagreement among the runs, in standard errors",
