@@ -359,7 +359,7 @@ def calibrate(
     final = [float(np.sqrt(np.mean(r**2))) for r in task.residuals(theta)]
     keys = [c.key for c in task.channels]
     return Estimate(
-        theta,
+        np.asarray(theta, dtype=np.float64),
         covariance,
         information,
         dict(zip(keys, final, strict=True)),

@@ -270,7 +270,11 @@ def _sail_fin(foils: pd.DataFrame, wall: float) -> Fin:
     plane = foils[foils.index.str.startswith("sail_plane")].iloc[0]
     inner = (plane["LE_root_x_m"], plane["TE_root_x_m"])
     return Fin(
-        ((wall, *inner), (plane["LE_root_s_m"], *inner), (plane["LE_tip_s_m"], plane["LE_tip_x_m"], plane["TE_tip_x_m"])),
+        (
+            (wall, *inner),
+            (plane["LE_root_s_m"], *inner),
+            (plane["LE_tip_s_m"], plane["LE_tip_x_m"], plane["TE_tip_x_m"]),
+        ),
         0.0,
     )
 

@@ -51,6 +51,8 @@ class Initial(Data):
 
     ``trim`` says what keeps a self-propelled boat level: the planes and the pitch that they
     need; planes and ballast at no pitch; or ballast and trim tank at no pitch and no planes.
+    ``upright``: weight has been shifted across a self-propelled boat against the propeller's
+    torque, as is done before a test.
     """
 
     state: Literal["self_propulsion", "as_given"]
@@ -60,6 +62,7 @@ class Initial(Data):
     pitch_deg: float = 0.0
     revolutions_rps: float | None = None
     trim: Literal["planes", "ballast", "tanks"] = "planes"
+    upright: bool = False
 
     @model_validator(mode="after")
     def _propelled_boats_move(self) -> Initial:

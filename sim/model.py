@@ -16,6 +16,8 @@ from sim.vehicle import Vehicle
 Array = NDArray[np.float64]
 _RULES = {"hold": kernel.HOLD, "linear": kernel.LINEAR, "linear_load": kernel.LINEAR_LOAD}
 MAX_FACTORS = 4
+# Order of the kernel's inertia: Ixx Iyy Izz Ixy Ixz Iyz.
+_INERTIA = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 
 
 @dataclass(frozen=True)
@@ -167,6 +169,27 @@ def with_tanks(model: kernel.Model, vehicle: Vehicle) -> kernel.Model:
     return model._replace(tank=_triple(vehicle.tanks.ballast.position.value))
 
 
+def weight_across(model: kernel.Model, lateral: float) -> kernel.Model:
+    """The model with its whole weight shifted to starboard, in the loads and in the mass matrix.
+
+    Parameters
+    ----------
+    lateral : Shift of the centre of gravity [m].
+    """
+    x, y, z = model.r_g
+    old, new = cross_matrix(model.r_g), cross_matrix((x, y + lateral, z))
+    first, second = model.mass * (new - old), -model.mass * (new @ new - old @ old)
+    mass = model.mass_matrix + np.block([[np.zeros((3, 3)), -first], [first, second]])
+    ixx, iyy, izz, ixy, ixz, iyz = model.inertia
+    moved = np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]]) + second
+    return model._replace(
+        mass_matrix=mass,
+        inverse_mass=np.linalg.inv(mass),
+        r_g=(x, y + lateral, z),
+        inertia=tuple(float(moved[i, j]) for i, j in _INERTIA),  # type: ignore[arg-type]
+    )
+
+
 def _batches(members: list[Coefficient]) -> Iterable[list[Coefficient]]:
     for i in range(0, len(members), kernel.WIDTH):
         yield members[i : i + kernel.WIDTH]
@@ -207,7 +230,7 @@ def assemble(coefficients: Coefficients, environment: Environment) -> kernel.Mod
         buoyancy=particulars.displaced_mass.value * environment.gravity,
         r_g=_triple(particulars.centre_of_gravity.value),
         r_b=_triple(particulars.centre_of_buoyancy.value),
-        inertia=tuple(float(inertia[i, j]) for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))),  # type: ignore[arg-type]
+        inertia=tuple(float(inertia[i, j]) for i, j in _INERTIA),  # type: ignore[arg-type]
         sail_top=particulars.sail_top.value[2],
         diameter=vehicle.propeller.diameter.value,
         wake=float(wake.values[0]) if wake else 0.0,

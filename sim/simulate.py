@@ -14,7 +14,7 @@ from sim.coefficients import Coefficients
 from sim.commands import compile_programme, law_code
 from sim.errors import InputError
 from sim.kernel import Model
-from sim.model import Environment, assemble, with_tanks
+from sim.model import Environment, assemble, weight_across, with_tanks
 from sim.trim import Trim, self_propulsion
 from sim.vehicle import Vehicle
 
@@ -111,7 +111,15 @@ def initial_state(case: Case, vehicle: Vehicle, model: Model) -> tuple[Array, Ar
         mixer = mixer_of(vehicle, case.sail_planes)
         limits = plane_limits(vehicle)[0]
         trim = self_propulsion(
-            model, mixer, first.speed_mps, first.depth_m, limits, first.trim, tank_limits(vehicle), _held(case)
+            model,
+            mixer,
+            first.speed_mps,
+            first.depth_m,
+            limits,
+            first.trim,
+            tank_limits(vehicle),
+            _held(case),
+            first.upright,
         )
         return trim.state.copy(), trim.controls.copy(), trim
     state = np.zeros(12)
@@ -198,6 +206,8 @@ def simulate(case: Case, coefficients: Coefficients, model: Model | None = None)
     if model is None:
         model = model_of(case, coefficients)
     state, controls, trim = initial_state(case, vehicle, model)
+    if trim and trim.lateral:
+        model = weight_across(model, trim.lateral)
     settings = settings_of(case, vehicle, state, controls, trim)
     dt = case.run.step_s
     steps, every = round(case.run.duration_s / dt), max(1, round(case.run.record_s / dt))

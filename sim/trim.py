@@ -30,6 +30,7 @@ class Trim:
     residual : Largest acceleration left [m/s^2 or rad/s^2].
     limited : Which of ballast and trim_tank stand at their limit, so that pitch or planes
         hold what they cannot.
+    lateral : Shift of the weight to starboard that keeps the boat upright [m].
     """
 
     state: Array
@@ -38,6 +39,7 @@ class Trim:
     dH: float
     residual: float
     limited: tuple[str, ...] = ()
+    lateral: float = 0.0
 
 
 # What keeps the boat level, two unknowns each; the rest of pitch, dV and tanks is zero.
@@ -48,9 +50,15 @@ TANK_NAMES = ("ballast", "trim_tank")
 
 
 def _solve(
-    model: kernel.Model, mixer: Array, speed: float, depth: float, free: tuple[str, ...], values: dict[str, float]
+    model: kernel.Model,
+    mixer: Array,
+    speed: float,
+    depth: float,
+    free: tuple[str, ...],
+    values: dict[str, float],
+    upright: bool,
 ) -> tuple[Trim, str]:
-    """Root of the six balances over n, heel, drift, dH and the two unknowns ``free``.
+    """Root of the six balances over n, heel (or, upright, y of the weight), drift, dH and ``free``.
 
     Returns
     -------
@@ -60,9 +68,12 @@ def _solve(
     # n relative to U/D: an advance coefficient near one. Tanks by what balances 1 % of weight.
     reference = speed / model.diameter
     size = {"pitch": 1.0, "dV": 1.0, "ballast": 0.01 * model.mass, "trim_tank": 1.0}
+    x_g, y_g, z_g = model.r_g
 
     def build(x: Array) -> tuple[Array, Array, dict[str, float]]:
         n, first, second, heel, drift, dh = x
+        if upright:
+            heel = 0.0
         level = values | {k: float(size[k] * v) for k, v in zip(free, (first, second), strict=True)}
         pitch = level["pitch"]
         u = speed * np.cos(drift) * np.cos(pitch)
@@ -76,9 +87,13 @@ def _solve(
         tanks = [level[k] for k in TANK_NAMES] if model.tank else []
         return state, np.array([*(mixer @ np.array([level["dV"], dh])), n * reference, *tanks]), level
 
+    def weighted(x: Array) -> kernel.Model:
+        # Where nothing accelerates, the weight's place matters and the mass matrix does not.
+        return model._replace(r_g=(x_g, y_g + float(x[3]), z_g)) if upright else model
+
     def residual(x: Array) -> Array:
         state, controls, _ = build(x)
-        kernel.rhs(model, state, controls, work, derivative)
+        kernel.rhs(weighted(x), state, controls, work, derivative)
         return derivative[:6].copy()
 
     found = root(residual, np.array([1.2, 0.0, 0.0, 0.0, 0.0, 0.0]), method="hybr", tol=1e-13)
@@ -92,9 +107,10 @@ def _solve(
             f"pitch {np.degrees(state[10]):.1f} deg, n {controls[mixer.shape[0]]:.3g} 1/s"
         )
     # The path is straight: heading such that the course is along earth x.
-    kernel.rhs(model, state, controls, work, derivative)
+    kernel.rhs(weighted(found.x), state, controls, work, derivative)
     state[11] = -np.arctan2(derivative[7], derivative[6])
-    return Trim(state, controls, level["dV"], float(found.x[5]), left), wrong
+    lateral = float(found.x[3]) if upright else 0.0
+    return Trim(state, controls, level["dV"], float(found.x[5]), left, lateral=lateral), wrong
 
 
 def self_propulsion(
@@ -106,6 +122,7 @@ def self_propulsion(
     level: str = "planes",
     tank_limit: tuple[float, float] | None = None,
     held: tuple[float, float] = (0.0, 0.0),
+    upright: bool = False,
 ) -> Trim:
     """Solve revolutions, heel, drift, dH and what keeps the boat level for straight flight.
 
@@ -121,6 +138,7 @@ def self_propulsion(
         stands at it, and dV (for the trim tank) or the pitch (for ballast) is solved instead.
     tank_limit : Largest ballast [kg] and shift of the centre of gravity [m].
     held : Ballast and shift where they are not solved.
+    upright : No heel: the weight is shifted across the boat against the propeller's torque.
 
     Raises
     ------
@@ -132,7 +150,7 @@ def self_propulsion(
     limits = dict(zip(TANK_NAMES, tank_limit or (np.inf, np.inf), strict=True))
     limited: tuple[str, ...] = ()
     while True:
-        found, wrong = _solve(model, mixer, speed, depth, free, values)
+        found, wrong = _solve(model, mixer, speed, depth, free, values, upright)
         if wrong:
             raise NoEquilibrium(wrong)
         amounts = dict(zip(TANK_NAMES, found.controls[mixer.shape[0] + 1 :], strict=bool(model.tank)))
