@@ -28,8 +28,8 @@ Array = NDArray[np.float64]
 _ALIKE = 0.9
 # A multiplier whose posterior is this close to its prior was not learnt.
 _UNLEARNT = 0.9
-# Shifts and disagreements beyond this many standard deviations are said.
-_FAR = 3.0
+# A multiplier that moves by more of its standard deviations without one source is said.
+_SHIFTED = 2.0
 
 
 @dataclass(frozen=True)
@@ -145,8 +145,7 @@ def _left_out(task: Problem, whole: Estimate, workers: int | None, each: Callabl
         predicted = {
             c.key[2]: float(np.sqrt(np.mean(r**2))) for c, r in zip(task.channels, residuals, strict=True) if dropped(c)
         }
-        gap = np.sqrt(np.maximum(estimate.deviation**2 - whole.deviation**2, 1e-12))
-        shift = (estimate.theta - whole.theta) / gap
+        shift = (estimate.theta - whole.theta) / np.maximum(estimate.deviation, whole.deviation)
         found.append(
             {
                 "case": out[0],
@@ -165,7 +164,7 @@ def _shifts(task: Problem, left_out: list[dict[str, Any]]) -> list[str]:
     said = []
     for one in left_out:
         for parameter, shift in zip(task.chosen, one["shift_in_sigma"], strict=True):
-            if abs(shift) > _FAR:
+            if abs(shift) > _SHIFTED:
                 text = f"{parameter.group.name} moves by {abs(shift):.1f} standard deviations without"
                 said.append(f"contradictory data: {text} {one['case']} {one['source']}")
     return said

@@ -13,6 +13,7 @@ ratio above that from its own deflection, so the factor belongs to both.
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -106,7 +107,7 @@ def _fin_panels(fin: Fin, counts: tuple[int, int, int]) -> tuple[list[Array], li
             along = np.array([lead + (trail - lead) * c, 0.0, 0.0])
             return np.asarray(along + (s[0] + (s[1] - s[0]) * t) * span)
 
-        for t0, t1 in zip(edges[:-1], edges[1:], strict=True):
+        for t0, t1 in itertools.pairwise(edges):
             for j in range(counts[2]):
                 # Bound vortex at a quarter, control point at three quarters of the panel.
                 bound, check = (j + 0.25) / counts[2], (j + 0.75) / counts[2]

@@ -160,5 +160,8 @@ def tail_downwash(vehicle: Vehicle, rows: pd.DataFrame, planes: CarryOver) -> Ta
         moment_factor=factor["M"],
         moment_sigma=sigma["M"],
         incidence_deg={k: v * _LINEAR_DEG for k, v in incidence.items()},
-        method="fixed roots by vortex lattice on the sail's wall; trailing vortex pair (elliptic loading) at the stern planes",
+        method=(
+            "fixed roots by vortex lattice on the sail's wall; "
+            "trailing vortex pair (elliptic loading) at the stern planes"
+        ),
     )

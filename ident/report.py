@@ -169,6 +169,19 @@ def _vocabulary(metadata: dict[str, str], rows: pd.DataFrame) -> list[dict[str, 
     ]
 
 
+def _calibration(commit: Version, vehicle: Vehicle, number: int) -> dict[str, Any] | None:
+    """What the version was calibrated with, with verdicts and a figure; None for captive versions."""
+    from ident.calibrated import verdict
+    from ident.calibration_figures import prior_and_posterior
+
+    found = _stored(commit.metadata, "calibration", {})
+    if not found:
+        return None
+    stamp = f"{vehicle.name}, database version {number}; program frame: {PROGRAM}"
+    groups = [g | {"verdict": verdict(g)} for g in found["groups"]]
+    return found | {"groups": groups, "figure": prior_and_posterior(found, stamp)}
+
+
 def _errata() -> list[dict[str, str]]:
     with (files("ident") / "data" / "errata.csv").open(encoding="utf-8") as stream:
         return list(csv.DictReader(stream))
@@ -199,6 +212,7 @@ def _content(db: str, number: int, vehicle: Vehicle, rows: pd.DataFrame) -> dict
         "warnings": group_warnings(_stored(commit.metadata, "warnings", [])),
         "unused": group_unused(_stored(commit.metadata, "unused", [])),
         "checks": _stored(commit.metadata, "checks", []) if "checks" in commit.metadata else None,
+        "calibration": _calibration(commit, vehicle, number),
         "vocabulary": vocabulary,
         "colours": colours,
         "errata": _errata(),
