@@ -68,7 +68,6 @@ class Channel:
     reading : Standard error of reading.
     against : Its share of the root mean square difference to another source, or zero.
     pieces : Independent pieces of the record.
-    from_start : Compare changes since the start.
     """
 
     key: Key
@@ -78,7 +77,6 @@ class Channel:
     reading: float
     against: float
     pieces: float
-    from_start: bool
 
     def residual(self, flown: Simulation, abscissa: str) -> Array:
         """Simulation less reference, (samples,)."""
@@ -86,8 +84,6 @@ class Channel:
         value = np.degrees(channel) if self.degrees else channel
         at = flown[abscissa]
         gap = np.interp(self.along, at, value) - self.value
-        if self.from_start:
-            gap = gap - (value[0] - self.value[0])
         size = float(np.abs(self.value).max())
         # A large number that grows with what is missing keeps the search going back.
         beyond = np.clip(self.along - at[-1], 0.0, None) / max(float(self.along[-1]), 1e-9)
@@ -212,7 +208,6 @@ def _channel(training: Training, reference: Series, name: str, channel: str, use
         reading=float(np.sqrt(np.mean(sigma**2))) if sigma is not None else 0.0,
         against=against,
         pieces=pieces(np.interp(at, along, value)) / _sharing(channel, used),
-        from_start=channel in training.from_start,
     )
 
 

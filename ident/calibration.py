@@ -39,8 +39,6 @@ class Training(Data):
 
     ``differs_from`` names another source of the same case; ``share`` of the mean squared
     difference between the two counts as this source's own variance, channel by channel.
-    ``from_start`` lists channels that are changes since the start, whatever offset their
-    record begins with.
     """
 
     case: str
@@ -48,7 +46,6 @@ class Training(Data):
     channels: list[str] | None = None
     differs_from: str | None = None
     share: Annotated[float, Field(ge=0, le=1)] = 0.5
-    from_start: list[str] = Field(default_factory=list)
 
 
 class Prior(Data):

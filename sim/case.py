@@ -105,6 +105,8 @@ class Reference(Data):
     Without ``file`` the case has no bundled reference, and users bring their own.
     ``abscissa``: the series are over time, or over the path length over ground.
     ``initial``: sources that are compared with a run from their own start.
+    ``from_start``: channels that are changes since the start, so that every series begins at
+    zero whatever offset it was published with.
     """
 
     file: str | None = None
@@ -114,6 +116,7 @@ class Reference(Data):
     abscissa: Literal["t", "s"] = "t"
     frame: FrameData
     initial: dict[str, Start] = Field(default_factory=dict)
+    from_start: list[str] = Field(default_factory=list)
 
 
 class Sweep(Data):
@@ -224,6 +227,16 @@ def _numbers(table: pd.DataFrame, column: str, path: Path) -> None:
     table[column] = numbers
 
 
+def _from_start(series: Series, channels: list[str]) -> Series:
+    """The series with the listed channels beginning at zero."""
+    for own in series.data.values():
+        for channel in channels:
+            if channel in own:
+                along, value, unit = own[channel]
+                own[channel] = (along, value - value[0], unit)
+    return series
+
+
 def read_series(path: Path, abscissa: Literal["t", "s"], frame: Frame) -> Series:
     """Read reference series and turn them to the program frame.
 
@@ -289,4 +302,4 @@ def load_reference(case: Case, where: str) -> Series:
         path = Path(where).parent / case.reference.file
     if not path.is_file():
         raise InputError(str(path), "missing", f"the reference file of case {case.name}")
-    return read_series(path, case.reference.abscissa, frame)
+    return _from_start(read_series(path, case.reference.abscissa, frame), case.reference.from_start)
