@@ -350,7 +350,7 @@ def calibrate(
             break
     data = _jacobian(task, theta, sigma, _STEP * prior, threads)
     information = data.T @ data
-    covariance = np.linalg.inv(information + np.diag(1.0 / prior**2))
+    covariance = np.asarray(np.linalg.inv(information + np.diag(1.0 / prior**2)), dtype=np.float64)
     final = [float(np.sqrt(np.mean(r**2))) for r in task.residuals(theta)]
     keys = [c.key for c in task.channels]
     return Estimate(

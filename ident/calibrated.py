@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -206,6 +206,15 @@ def calibrated_rows(rows: pd.DataFrame, chosen: list[Parameter], estimate: Estim
     return out[column_order()]
 
 
+def _rounded(estimate: Estimate) -> Estimate:
+    """Four digits: far below any posterior error, and the same on another machine."""
+    return replace(
+        estimate,
+        theta=np.array([float(f"{x:.4g}") for x in estimate.theta]),
+        covariance=np.array([[float(f"{x:.4g}") for x in row] for row in estimate.covariance]),
+    )
+
+
 def run(
     name: str,
     db: str,
@@ -238,7 +247,8 @@ def run(
     chosen = parameters(spec, vehicle, rows, where)
     task = problem(spec, where, vehicle, rows, chosen)
     estimate = calibrate(task, workers, each)
-    theta, sigma = [float(f"{x:.9g}") for x in estimate.theta], [float(x) for x in estimate.deviation]
+    estimate = _rounded(estimate)
+    theta, sigma = [float(x) for x in estimate.theta], [float(x) for x in estimate.deviation]
     without = _left_out(task, estimate, workers, each) if left_out else []
     warnings = contradictions(task) + _shifts(task, without) + _identifiability(task, estimate)
     if not estimate.converged:
@@ -252,9 +262,15 @@ def run(
         "file_digest": own,
         "trained": list(dict.fromkeys(f"{c.key[0]}:{c.key[1]}" for c in task.channels)),
         "groups": [_group(p, x, s) for p, x, s in zip(chosen, theta, sigma, strict=True)],
-        "covariance": [[float(f"{x:.6g}") for x in row] for row in estimate.covariance],
+        "covariance": estimate.covariance.tolist(),
         "series": [
-            {"case": k[0], "source": k[1], "channel": k[2], "rmse": float(f"{v:.6g}"), "sigma": estimate.sigma[k]}
+            {
+                "case": k[0],
+                "source": k[1],
+                "channel": k[2],
+                "rmse": float(f"{v:.4g}"),
+                "sigma": float(f"{estimate.sigma[k]:.4g}"),
+            }
             for k, v in estimate.rms.items()
         ],
         "left_out": without,

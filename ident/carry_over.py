@@ -16,6 +16,7 @@ from __future__ import annotations
 import itertools
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -29,8 +30,8 @@ Array = NDArray[np.float64]
 
 # Lattice: panels along span (root, plane) and chord, and a coarser one for the discretisation error.
 _FINE, _COARSE = (6, 10, 6), (4, 7, 4)
-# Trailing vortices end this many spans downstream; further makes no difference.
-_FAR = 300.0
+# Trailing vortices end so far downstream [m]; further makes no difference.
+_FAR = np.array([1e4, 0.0, 0.0])
 
 
 @dataclass(frozen=True)
@@ -155,9 +156,8 @@ def horseshoes(p: Array, a: Array, b: Array) -> Array:
     -------
     (n, m, 3) [1/m]; the trailing vortices go aft (+x).
     """
-    far = np.array([_FAR * float(np.abs(b - a).sum()), 0.0, 0.0])
     at = p[:, None, :]
-    return _segment(at, a + far, a) + _segment(at, a, b) + _segment(at, b, b + far)
+    return _segment(at, a + _FAR, a) + _segment(at, a, b) + _segment(at, b, b + _FAR)
 
 
 def in_cylinder(p: Array, radius: float) -> Array:
@@ -179,7 +179,7 @@ def influence(grid: Lattice, image_a: Array, image_b: Array) -> Array:
     return np.asarray(np.einsum("nmi,ni->nm", both, grid.normal))
 
 
-def _normal_load(circulation: Array, a: Array, b: Array, direction: Array) -> Array:
+def _normal_load(circulation: NDArray[Any], a: Array, b: Array, direction: Array) -> Array:
     """Load along ``direction`` of each bound vortex, over density and speed (Kutta, Joukowsky)."""
     return np.asarray(circulation * (np.cross(np.array([1.0, 0.0, 0.0]), b - a) @ direction))
 
@@ -253,9 +253,12 @@ def _parts(vehicle: Vehicle) -> tuple[pd.DataFrame, Hull, pd.DataFrame]:
 
 def _stern_fins(foils: pd.DataFrame, gap: float, radius: float) -> list[Fin]:
     """The stern fins with the gap between its leading- (0) and trailing-edge (1) place."""
+    rows = {str(k): {str(c): float(x) for c, x in row.items()} for k, row in foils.iterrows()}
     fins = []
-    for name, plane in foils[foils.index.str.startswith("stern_plane")].iterrows():
-        root = foils.loc[str(name).replace("stern_plane", "stern_root")]
+    for name, plane in rows.items():
+        if not name.startswith("stern_plane"):
+            continue
+        root = rows[name.replace("stern_plane", "stern_root")]
         cut = plane["LE_root_s_m"] + gap * (plane["TE_root_s_m"] - plane["LE_root_s_m"])
         tip = 0.5 * (plane["LE_tip_s_m"] + plane["TE_tip_s_m"])
         chords = (
@@ -268,16 +271,10 @@ def _stern_fins(foils: pd.DataFrame, gap: float, radius: float) -> list[Fin]:
 
 
 def _sail_fin(foils: pd.DataFrame, wall: float) -> Fin:
-    plane = foils[foils.index.str.startswith("sail_plane")].iloc[0]
+    plane = {str(k): float(x) for k, x in foils[foils.index.str.startswith("sail_plane")].iloc[0].items()}
     inner = (plane["LE_root_x_m"], plane["TE_root_x_m"])
-    return Fin(
-        (
-            (wall, *inner),
-            (plane["LE_root_s_m"], *inner),
-            (plane["LE_tip_s_m"], plane["LE_tip_x_m"], plane["TE_tip_x_m"]),
-        ),
-        0.0,
-    )
+    outer = (plane["LE_tip_s_m"], plane["LE_tip_x_m"], plane["TE_tip_x_m"])
+    return Fin(((wall, *inner), (plane["LE_root_s_m"], *inner), outer), 0.0)
 
 
 def carry_over(vehicle: Vehicle) -> CarryOver:
@@ -308,7 +305,7 @@ def carry_over(vehicle: Vehicle) -> CarryOver:
     def sigma(key: str) -> float:
         # Each pair spans what is possible: a quarter of it is one standard deviation.
         halves = [0.25 * abs(found[i][key] - found[i + 1][key]) for i in (0, 2)]
-        return float(np.hypot(np.hypot(*halves), best[key] - coarse[key]))
+        return float(np.sqrt(halves[0] ** 2 + halves[1] ** 2 + (best[key] - coarse[key]) ** 2))
 
     plane = foils[foils.index.str.startswith("sail_plane")].iloc[0]
     chord = np.linspace(plane["LE_root_x_m"], plane["TE_root_x_m"], 9)
