@@ -70,7 +70,7 @@ def still(campaign, rows):
     """BB2 without hydrodynamics but one added mass in heave, at rest; and that mass [kg]."""
     sail = rows[(rows["coefficient"] == "Z_wdot_section") & (rows["part"] == "Hull 5")]
     assert len(sail) == 1
-    vehicle = campaign.vehicle.model_copy(deep=True)
+    vehicle = campaign.vehicle.model_copy(deep=True, update={"added_mass": "sections"})
     for section in vehicle.sections.centres:
         # At the origin, so that heave stays alone.
         section.position = [0.0, 0.0, 0.0]

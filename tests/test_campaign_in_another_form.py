@@ -18,9 +18,9 @@ from sim.errors import InputError
 from sim.frames import Frame, FrameError
 
 AXES = {
-    "x": (["X_N", "udot_mps2", "x_m"], ["K_Nm", "p_radps"]),
-    "y": (["Y_N", "vdot_mps2", "y_m"], ["M_Nm", "q_radps"]),
-    "z": (["Z_N", "wdot_mps2", "z_m"], ["N_Nm", "r_radps"]),
+    "x": (["X_N", "udot_mps2", "x_m"], ["K_Nm", "p_radps", "pdot_radps2"]),
+    "y": (["Y_N", "vdot_mps2", "y_m"], ["M_Nm", "q_radps", "qdot_radps2"]),
+    "z": (["Z_N", "wdot_mps2", "z_m"], ["N_Nm", "r_radps", "rdot_radps2"]),
 }
 
 
@@ -43,7 +43,7 @@ def turned(tables, signs: dict[str, int], hand: int):
 
 def scaled(tables, ratio: float):
     powers = {"U_mps": -0.5, "n_rps": 0.5} | dict.fromkeys(("D0_m", "R0_m", "x_m", "y_m", "z_m"), -1)
-    powers |= {f"{rate}_radps": 0.5 for rate in "pqr"}
+    powers |= {f"{rate}_radps": 0.5 for rate in "pqr"} | {f"{rate}dot_radps2": 1 for rate in "pqr"}
     powers |= {f"{o}_N": -3 for o in "XYZ"} | {f"{o}_Nm": -4 for o in "KMN"}
     other = {}
     for name, table in tables.items():
