@@ -33,18 +33,23 @@ def _connected(address: str) -> Any:
     """
     try:
         from distributed import Client
+        from distributed.comm import resolve_address
     except ImportError as error:
         allowed = "pip install 'ident-submarine[dask]'"
         raise InputError("--dask", "the package distributed is not installed", allowed) from error
     try:
+        # A client that failed on a malformed address would complain once more when it is collected.
+        resolve_address(address)
         client = Client(address, timeout=_PATIENCE, set_as_default=False)
     except (OSError, ValueError, TypeError) as error:
         raise InputError(f"--dask {address}", f"no scheduler answers: {error}", _ADDRESS) from error
     try:
         found = set(client.run(program_version).values())
-    except ImportError as error:
+    except Exception as error:
+        # What a worker cannot import arrives as a plain Exception with the text of its own.
         client.close()
-        raise InputError(f"--dask {address}", f"workers that cannot import ident: {error}", __version__) from error
+        allowed = f"workers with ident {__version__}"
+        raise InputError(f"--dask {address}", f"workers that cannot run ident: {error}", allowed) from error
     if found != {__version__}:
         client.close()
         text = f"workers with ident {', '.join(sorted(found))}" if found else "a scheduler without workers"
@@ -77,7 +82,7 @@ def over_dask(address: str, batch: Any, chunks: Sequence[Array]) -> Iterator[tup
         there = client.scatter(batch, broadcast=True)
         futures = client.map(type(batch).fly, [there] * len(chunks), list(chunks), pure=False)
         place = {future.key: i for i, future in enumerate(futures)}
-        for future in as_completed(futures):
+        for future in as_completed(futures, loop=client.loop):
             if future.status == "error" and not isinstance(future.exception(), KilledWorker):
                 raise future.exception()
             if future.status != "finished":
