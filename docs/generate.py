@@ -85,7 +85,18 @@ def accuracy(board: dict[str, Any]) -> str:
         [case["case"], source, f"`{channel}`", e["unit"], *[number(e[k]) for k in keys], yes_no(case["trained"])]
         for case, source, channel, e in entries(board["cases"])
     ]
-    header = ["case", "reference", "channel", "unit", "RMSE", "parent", "published model", "ratio", "to parent", "trained"]
+    header = [
+        "case",
+        "reference",
+        "channel",
+        "unit",
+        "RMSE",
+        "parent",
+        "published model",
+        "ratio",
+        "to parent",
+        "trained",
+    ]
     labels = ["simulated", "EXP", "CFD", "published_model"]
     main_case = next(case for case in board["cases"] if case["case"] == CASE)
     metrics = [

@@ -28,6 +28,10 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 # Samples handed out at once: enough that handing out costs nothing, few enough for a progress bar.
 CHUNK = 8
+# Relative variance below which a direction of correlated values is rounding.
+_LEAST_VARIANCE = 1e-9
+# Standard deviations of chance that a variance share must exceed.
+_CHANCE = 3.0
 LEVELS = {"50": (25.0, 75.0), "95": (2.5, 97.5)}
 
 
@@ -41,6 +45,7 @@ class Bands:
     channels : Channel -> (samples, rows), NaN after a sample ended.
     own : The same of the flights from the start of a source's record, by source.
     draws : (samples, estimates) what was drawn, in standard errors.
+    correlation : (estimates, estimates) they were drawn with.
     estimates : Coefficient of each estimate.
     failed : Samples without a self-propulsion state.
     seed : Of the random generator.
@@ -50,6 +55,7 @@ class Bands:
     channels: dict[str, Array]
     own: dict[str, dict[str, Array]]
     draws: Array
+    correlation: Array
     estimates: list[str]
     failed: int
     seed: int
@@ -220,26 +226,27 @@ def fly_samples(
     if not flown.any():
         raise InputError(f"case {case.name}", "no sample has a self-propulsion state", "smaller errors or another case")
     kept = {source: stack if flown.all() else stack[:, flown] for source, stack in stacks.items()}
-    return _bands(case, batch, kept, draws[flown], estimates, int(samples - flown.sum()), seed)
+    time, channels = _up_to_the_end(case, batch, kept)
+    return Bands(
+        time=time,
+        channels=channels.pop(""),
+        own=channels,
+        draws=draws[flown],
+        correlation=correlation,
+        estimates=list(estimates["coefficient"]),
+        failed=int(samples - flown.sum()),
+        seed=seed,
+    )
 
 
-def _bands(
-    case: Case,
-    batch: Batch,
-    stacks: dict[str, Array],
-    draws: Array,
-    estimates: pd.DataFrame,
-    failed: int,
-    seed: int,
-) -> Bands:
-    """Bands up to the end of the longest flight; NaN after a sample ended."""
+def _up_to_the_end(case: Case, batch: Batch, stacks: dict[str, Array]) -> tuple[Array, dict[str, dict[str, Array]]]:
+    """Times and, by source, channels up to the end of the longest flight."""
     ends = np.max([np.isfinite(stack[0]).any(axis=0).sum() for stack in stacks.values()])
     channels = {s: dict(zip(batch.channels, stack[:, :, :ends], strict=True)) for s, stack in stacks.items()}
     time = np.arange(ends) * samples_of(case)[1] * case.run.step_s
     for stack in channels.values():
         del stack["t"]
-    own = {source: stack for source, stack in channels.items() if source}
-    return Bands(time, channels[""], own, draws, list(estimates["coefficient"]), failed, seed)
+    return time, channels
 
 
 def inside(bands: Bands, case: Case, reference: Series) -> dict[str, Any]:
@@ -267,23 +274,42 @@ def inside(bands: Bands, case: Case, reference: Series) -> dict[str, Any]:
     return found
 
 
+def _scores(draws: Array, correlation: Array) -> Array:
+    """Independent standard scores of correlated draws of one coefficient, (samples, rank)."""
+    values, vectors = np.linalg.eigh(correlation)
+    free = values > _LEAST_VARIANCE * values[-1]
+    scores = draws @ (vectors[:, free] / np.sqrt(values[free]))
+    return np.asarray(scores - scores.mean(axis=0))
+
+
 def variance_shares(bands: Bands, channel: str, most: int = 8) -> list[dict[str, Any]]:
     """Which coefficients cause the width of a channel's band.
 
-    The squared correlation of each estimate with the channel, averaged over the record
-    with the variance as weight, summed by coefficient, less what chance gives (1/samples
-    an estimate). Correlated estimates share what they have in common.
+    The share of the variance that a linear function of all values of a coefficient
+    accounts for: the squared correlations of the channel with the coefficient's independent
+    scores, averaged over the record with the variance as weight, less what chance gives
+    (1/samples a score); a share within what chance scatters is left out. Coefficients whose
+    errors are correlated each have what they share, so that the shares may sum to more than one.
     """
     values = bands.channels[channel]
     complete = np.isfinite(values).all(axis=0)
     spread = values[:, complete] - values[:, complete].mean(axis=0)
-    variance = (spread**2).sum(axis=0)
-    scores = bands.draws - bands.draws.mean(axis=0)
-    scale = (scores**2).sum(axis=0)
-    square = (scores.T @ spread) ** 2 / np.where(scale > 0.0, scale, 1.0)[:, None]
-    share = square.sum(axis=1) / variance.sum() if variance.sum() > 0.0 else np.zeros(len(scale))
-    total = pd.Series(share - 1.0 / len(values)).groupby(bands.estimates).sum().sort_values(ascending=False)
-    return [{"coefficient": str(k), "share": float(v)} for k, v in total.head(most).items() if v > 0.0]
+    variance = float((spread**2).sum())
+    if variance == 0.0:
+        return []
+    found: dict[str, float] = {}
+    names = np.array(bands.estimates)
+    for coefficient in dict.fromkeys(bands.estimates):
+        places = np.flatnonzero(names == coefficient)
+        scores = _scores(bands.draws[:, places], bands.correlation[np.ix_(places, places)])
+        square = ((scores.T @ spread) ** 2).sum(axis=1) / (scores**2).sum(axis=0)
+        rank, samples = scores.shape[1], len(values)
+        share = float(square.sum() / variance - rank / samples)
+        # By chance, samples * square / variance is chi-square with a degree of freedom a score.
+        if share > _CHANCE * np.sqrt(2.0 * rank) / samples:
+            found[coefficient] = min(share, 1.0)
+    largest = sorted(found.items(), key=lambda item: -item[1])[:most]
+    return [{"coefficient": name, "share": share} for name, share in largest]
 
 
 def summary(bands: Bands, case: Case, reference: Series) -> dict[str, Any]:

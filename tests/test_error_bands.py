@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ident.bands import covariance, draw, fly_samples, inside, variance_shares
+from ident.bands import Bands, covariance, draw, fly_samples, inside, variance_shares
 from sim.case import load_case, load_reference
 from sim.coefficients import Coefficients
 from sim.simulate import simulate
@@ -87,3 +87,24 @@ def test_reference_made_of_the_middle_of_the_band_lies_inside(short_case, campai
     found = inside(bands, case, reference)["CFD"]
     assert found["theta"] == {"50": 1.0, "95": 1.0}
     assert found["q"] == {"50": 0.0, "95": 0.0}
+
+
+def test_shares_of_correlated_values_closed_form():
+    """A has two values that move as one, B one of its own: y = 3 a + 4 b has shares 9/25 and 16/25."""
+    samples, correlation = 4000, np.eye(3)
+    correlation[0, 1] = correlation[1, 0] = 1.0
+    drawn = draw(correlation, samples, seed=2)
+    y = 1.5 * drawn[:, 0] + 1.5 * drawn[:, 1] + 4.0 * drawn[:, 2]
+    channels = {"psi": y[:, None] * np.array([1.0, 2.0])}
+    bands = Bands(np.arange(2.0), channels, {}, drawn, correlation, ["A", "A", "B"], 0, 2)
+    shares = {s["coefficient"]: s["share"] for s in variance_shares(bands, "psi")}
+    assert shares == pytest.approx({"A": 9.0 / 25.0, "B": 16.0 / 25.0}, abs=4.0 / np.sqrt(samples))
+
+
+def test_share_of_correlated_coefficients_is_what_each_would_explain():
+    """Two coefficients with correlation 0.6, y = a: A explains all, B 0.36 of it."""
+    samples, correlation = 4000, np.array([[1.0, 0.6], [0.6, 1.0]])
+    drawn = draw(correlation, samples, seed=6)
+    bands = Bands(np.arange(1.0), {"psi": drawn[:, :1]}, {}, drawn, correlation, ["A", "B"], 0, 6)
+    shares = {s["coefficient"]: s["share"] for s in variance_shares(bands, "psi")}
+    assert shares == pytest.approx({"A": 1.0, "B": 0.36}, abs=4.0 / np.sqrt(samples))
