@@ -17,7 +17,7 @@ from ident.derivatives import derivatives
 from ident.figures import case_figure
 from ident.findings import rules
 from ident.fit import fit
-from ident.scoreboard import run_all
+from ident.scoreboard import entries, run_all
 from sim import catalogue
 from sim.case import load_case
 from sim.coefficients import Coefficients
@@ -52,37 +52,60 @@ def signs(coefficients: Coefficients) -> str:
     return table(["derivative", "hull and sail", "whole boat", "expected", "as expected", "SUBOFF, appended"], rows)
 
 
-def accuracy(board: dict[str, Any]) -> str:
-    """Errors of every case, and the metrics of the main one."""
-    errors = [
-        [
-            case["case"],
-            source,
-            f"`{channel}`",
-            e["unit"],
-            *[f"{e[k]:.3g}" for k in ("rmse", "published_model_rmse", "ratio")],
-        ]
-        for case in board["cases"]
-        for source, channels in case["references"].items()
-        for channel, e in channels.items()
+def number(value: float | None) -> str:
+    """Three digits, or a dash."""
+    return "-" if value is None else f"{value:.3g}"
+
+
+def provenance(board: dict[str, Any]) -> str:
+    """Which versions are compared, what they were trained on, and the geometric means."""
+    lines = []
+    for name, trained in board["trained_on"].items():
+        case = next(c for c in board["cases"] if c.get("vehicle") == name)
+        parent = case["parent"]
+        before = f"from version {parent['version']} (`{parent['digest'][:16]}`)" if parent else "no parent"
+        source = f"trained on {', '.join(trained)}" if trained else "captive-only, trained on no maneuver"
+        database = case["database"]
+        lines.append(f"* `{name}`: version {database['version']} (`{database['digest'][:16]}`), {before}, {source}.")
+    ratios = [board[k] for k in ("geometric_mean_ratio", "geometric_mean_ratio_to_parent")]
+    means = [
+        [f"{kind} cases", *["-" if ratio[kind] is None else f"{ratio[kind]:.2f}" for ratio in ratios]]
+        for kind in ("trained", "untrained")
     ]
+    header = ["geometric mean of the error ratios", "to the published model", "to the parent version"]
+    worst = board["worst_ratio"]
+    place = f"{worst['case']}, {worst['source']}, `{worst['channel']}`"
+    return "\n".join([*lines, "", table(header, means), "", f"Worst ratio: {worst['ratio']:.2f} ({place})."])
+
+
+def accuracy(board: dict[str, Any]) -> str:
+    """Errors of every case beside the parent version and the published model, and the metrics of the main one."""
+    keys = ("rmse", "parent_rmse", "published_model_rmse", "ratio", "ratio_to_parent")
+    errors = [
+        [case["case"], source, f"`{channel}`", e["unit"], *[number(e[k]) for k in keys], yes_no(case["trained"])]
+        for case, source, channel, e in entries(board["cases"])
+    ]
+    header = ["case", "reference", "channel", "unit", "RMSE", "parent", "published model", "ratio", "to parent", "trained"]
     labels = ["simulated", "EXP", "CFD", "published_model"]
     main_case = next(case for case in board["cases"] if case["case"] == CASE)
     metrics = [
-        [f"`{m}`", *["-" if values[c] is None else f"{values[c]:.3g}" for c in labels]]
+        [f"`{m}`", *[number(values[c]) for c in labels]]
         for m, values in main_case["metrics"].items()
+        if any(values[c] is not None for c in labels)
     ]
-    mean = board["geometric_mean_ratio"]["untrained"]
-    digest = main_case["database"]["digest"][:16]
     return "\n\n".join(
         [
-            f"Captive-only database `{digest}`, no calibration, no factor; trained on no case. "
-            f"Geometric mean of the ratios: {mean:.2f}.",
-            table(["case", "reference", "channel", "unit", "RMSE", "published model's RMSE", "ratio"], errors),
+            provenance(board),
+            table(header, errors),
             f"Metrics of `{CASE}`:",
             table(["metric", *[c.replace("_", " ") for c in labels]], metrics),
         ]
     )
+
+
+def yes_no(value: bool) -> str:
+    """A flag in words."""
+    return "yes" if value else "no"
 
 
 def errata() -> str:
@@ -150,6 +173,7 @@ def main() -> int:
     with tempfile.TemporaryDirectory() as folder:
         db = str(Path(folder) / "coeff_db")
         fitted = fit(ROOT / "raw_captive_data", db)[0]
+        # The latest version is what is flown: calibrations that the README shall show are committed here.
         board, flown = run_all(db, None, None)
         coefficients = Coefficients(fitted.campaign.vehicle, fitted.rows)
         if not only_check:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -12,11 +12,13 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from ident.cluster import over_dask
 from sim.case import Case, Series, in_radians
 from sim.coefficients import Coefficients
 from sim.database import correlation_pairs
 from sim.errors import InputError
-from sim.simulate import Simulation, model_of, simulate
+from sim.model import Assembly
+from sim.simulate import DERIVED, columns_of, environment_of, equipped, fly, samples_of, uses_tanks
 from sim.trim import NoEquilibrium
 from sim.vehicle import Vehicle
 
@@ -24,7 +26,8 @@ if TYPE_CHECKING:
     from rich.console import Console
 
 Array = NDArray[np.float64]
-_DERIVED = ("U", "D0", "s", "u_over_U0", "dz_over_L0")
+# Samples handed out at once: enough that handing out costs nothing, few enough for a progress bar.
+CHUNK = 8
 LEVELS = {"50": (25.0, 75.0), "95": (2.5, 97.5)}
 
 
@@ -101,6 +104,70 @@ def _row_steps(rows: pd.DataFrame, estimates: pd.DataFrame) -> tuple[NDArray[np.
     return index, np.asarray(np.where(turned, -1.0, 1.0) * rows["stderr"].to_numpy(), dtype=np.float64)
 
 
+@dataclass(frozen=True)
+class Batch:
+    """A case to be flown with many sets of row values; goes to other processes as it is.
+
+    Attributes
+    ----------
+    flights : The case, under "", and the case from the start of a source's record, by source.
+    vehicle : Of the case.
+    assembly : Row values to the model.
+    channels : Names of what a flight gives.
+    """
+
+    flights: dict[str, Case]
+    vehicle: Vehicle
+    assembly: Assembly
+    channels: tuple[str, ...]
+
+    def fly(self, values: Array) -> list[dict[str, Array] | None]:
+        """Fly one sample after the other.
+
+        Parameters
+        ----------
+        values : (k, rows) row values.
+
+        Returns
+        -------
+        For each sample, (channels, records) by source; None without a self-propulsion state.
+        """
+        found: list[dict[str, Array] | None] = []
+        for sample in values:
+            model = self.assembly.model(sample)
+            try:
+                flown = {s: fly(c, self.vehicle, equipped(c, self.vehicle, model)) for s, c in self.flights.items()}
+            except NoEquilibrium:
+                found.append(None)
+                continue
+            found.append({s: np.stack([one[c] for c in self.channels]) for s, one in flown.items()})
+        return found
+
+
+def batch_of(case: Case, vehicle: Vehicle, rows: pd.DataFrame) -> Batch:
+    """The batch of a case; raises ``InputError`` when it uses tanks that the vehicle lacks."""
+    started = {s: case.started_as(s) for s in (case.reference.compare if case.reference else [])}
+    assembly = Assembly(Coefficients(vehicle, rows), environment_of(case))
+    equipped(case, vehicle, assembly.model(rows["value"].to_numpy()))
+    return Batch(
+        flights={"": case} | {s: c for s, c in started.items() if c is not None},
+        vehicle=vehicle,
+        assembly=assembly,
+        channels=(*columns_of(vehicle, uses_tanks(case)), *DERIVED),
+    )
+
+
+def _over_threads(
+    batch: Batch, chunks: Sequence[Array], workers: int | None
+) -> Iterator[tuple[int, list[dict[str, Array] | None]]]:
+    """Place of a chunk and its flights, as they are done."""
+    with ThreadPoolExecutor(workers or os.cpu_count()) as pool:
+        place = {pool.submit(batch.fly, chunk): i for i, chunk in enumerate(chunks)}
+        for future in as_completed(list(place)):
+            # Popped, so that its flights are not kept.
+            yield place.pop(future), future.result()
+
+
 def fly_samples(
     case: Case,
     vehicle: Vehicle,
@@ -108,16 +175,22 @@ def fly_samples(
     samples: int,
     seed: int = 0,
     workers: int | None = None,
-    each: Callable[[], None] = lambda: None,
+    each: Callable[[int], None] = lambda done: None,
+    dask: str | None = None,
+    chunk: int = CHUNK,
 ) -> Bands:
     """Fly a case with coefficient sets drawn from the errors of the database.
+
+    Sample i depends on the seed and on i alone, wherever it is flown.
 
     Parameters
     ----------
     case, vehicle, rows : What is flown, from which version.
     samples, seed : Number of coefficient sets and seed of the generator.
-    workers : Threads; all cores when None. The result does not depend on it.
-    each : Called after each flight.
+    workers : Threads; all cores when None.
+    each : Called with the number of samples flown since the last call.
+    dask : Address of a Dask scheduler that flies them instead.
+    chunk : Samples handed out at once.
 
     Returns
     -------
@@ -126,48 +199,47 @@ def fly_samples(
     Raises
     ------
     InputError
-        When no sample has a self-propulsion state.
+        When no sample has a self-propulsion state, or as ``ident.cluster.over_dask``.
     """
     estimates, correlation = covariance(rows)
     draws = draw(correlation, samples, seed)
     index, step = _row_steps(rows, estimates)
-    base = Coefficients(vehicle, rows)
-    value = rows["value"].to_numpy()
-
-    started = {s: case.started_as(s) for s in (case.reference.compare if case.reference else [])}
-    flights = {"": case} | {s: c for s, c in started.items() if c is not None}
-
-    def one(i: int) -> dict[str, Simulation] | None:
-        moved = base.with_values(value + np.where(index >= 0, draws[i][index] * step, 0.0))
-        try:
-            model = model_of(case, moved)
-            return {s: simulate(c, moved, model) for s, c in flights.items()}
-        except NoEquilibrium:
-            return None
-        finally:
-            each()
-
-    with ThreadPoolExecutor(workers or os.cpu_count()) as pool:
-        flown = list(pool.map(one, range(samples)))
-    kept = [i for i, s in enumerate(flown) if s is not None]
-    if not kept:
+    value = rows["value"].to_numpy() + np.where(index >= 0, draws[:, index] * step, 0.0)
+    chunks = [value[i : i + chunk] for i in range(0, samples, chunk)]
+    batch = batch_of(case, vehicle, rows)
+    steps, every = samples_of(case)
+    shape = (len(batch.channels), samples, steps // every + 1)
+    stacks = {source: np.full(shape, np.nan) for source in batch.flights}
+    flown = np.zeros(samples, dtype=bool)
+    for place, found in over_dask(dask, batch, chunks) if dask else _over_threads(batch, chunks, workers):
+        for i, one in enumerate(found, start=place * chunk):
+            flown[i] = one is not None
+            for source, record in (one or {}).items():
+                stacks[source][:, i, : record.shape[1]] = record
+        each(len(found))
+    if not flown.any():
         raise InputError(f"case {case.name}", "no sample has a self-propulsion state", "smaller errors or another case")
-    done = [s for s in flown if s is not None]
-    time = max((s["t"] for flown_from in done for s in flown_from.values()), key=len)
-    channels = {source: _stacked([s[source] for s in done], time) for source in flights}
+    kept = {source: stack if flown.all() else stack[:, flown] for source, stack in stacks.items()}
+    return _bands(case, batch, kept, draws[flown], estimates, int(samples - flown.sum()), seed)
+
+
+def _bands(
+    case: Case,
+    batch: Batch,
+    stacks: dict[str, Array],
+    draws: Array,
+    estimates: pd.DataFrame,
+    failed: int,
+    seed: int,
+) -> Bands:
+    """Bands up to the end of the longest flight; NaN after a sample ended."""
+    ends = np.max([np.isfinite(stack[0]).any(axis=0).sum() for stack in stacks.values()])
+    channels = {s: dict(zip(batch.channels, stack[:, :, :ends], strict=True)) for s, stack in stacks.items()}
+    time = np.arange(ends) * samples_of(case)[1] * case.run.step_s
+    for stack in channels.values():
+        del stack["t"]
     own = {source: stack for source, stack in channels.items() if source}
-    return Bands(time, channels[""], own, draws[kept], list(estimates["coefficient"]), samples - len(kept), seed)
-
-
-def _stacked(flown: list[Simulation], time: Array) -> dict[str, Array]:
-    """Channel -> (samples, rows), NaN after a sample ended."""
-    channels: dict[str, Array] = {}
-    for name in (*flown[0].columns[1:], *_DERIVED):
-        stack = np.full((len(flown), time.size), np.nan)
-        for row, simulation in zip(stack, flown, strict=True):
-            row[: len(simulation.record)] = simulation[name]
-        channels[name] = stack
-    return channels
+    return Bands(time, channels[""], own, draws, list(estimates["coefficient"]), failed, seed)
 
 
 def inside(bands: Bands, case: Case, reference: Series) -> dict[str, Any]:

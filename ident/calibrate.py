@@ -29,7 +29,8 @@ from ident.validate import check_reference
 from sim.case import Case, Series, load_case, load_reference
 from sim.coefficients import Coefficients
 from sim.errors import InputError
-from sim.simulate import Simulation, simulate
+from sim.model import Assembly, Environment
+from sim.simulate import Simulation, environment_of, equipped, fly
 from sim.trim import NoEquilibrium
 from sim.vehicle import Vehicle
 
@@ -117,11 +118,11 @@ class Problem:
     def residuals(self, theta: Array) -> list[Array]:
         """Residuals of every series at multipliers ``theta``, in the references' units."""
         values = apply(self.rows["value"].to_numpy(), self.chosen, theta)
-        coefficients = self._base().with_values(values)
         flown: dict[str, Simulation | None] = {}
         for name, (case, _) in self.cases.items():
+            model = equipped(case, self.vehicle, self._assembly(case).model(values))
             try:
-                flown[name] = simulate(case, coefficients)
+                flown[name] = fly(case, self.vehicle, model)
             except NoEquilibrium:
                 flown[name] = None
         found = []
@@ -133,13 +134,15 @@ class Problem:
                 found.append(channel.residual(one, self.cases[channel.key[0]][1]))
         return found
 
-    def _base(self) -> Coefficients:
-        if "base" not in _CACHE or _CACHE["base"][0] is not self.rows:
-            _CACHE["base"] = (self.rows, Coefficients(self.vehicle, self.rows))
-        return _CACHE["base"][1]
+    def _assembly(self, case: Case) -> Assembly:
+        environment = environment_of(case)
+        if environment not in _CACHE or _CACHE[environment][0] is not self.rows:
+            assembly = Assembly(Coefficients(self.vehicle, self.rows), environment)
+            _CACHE[environment] = (self.rows, assembly)
+        return _CACHE[environment][1]
 
 
-_CACHE: dict[str, tuple[pd.DataFrame, Coefficients]] = {}
+_CACHE: dict[Environment, tuple[pd.DataFrame, Assembly]] = {}
 
 
 @dataclass(frozen=True)

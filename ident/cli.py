@@ -201,6 +201,7 @@ def runs(folder: Path, out: Path, json_path: str | None) -> None:
 @click.option("--strict", is_flag=True, help="Exit 1 when a tolerance of a case file is missed.")
 @click.option("--samples", type=click.IntRange(min=2), default=None, help="Draw so many coefficient sets; error bands.")
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Seed of the draws.")
+@click.option("--dask", default=None, metavar="ADDRESS", help="With --samples: fly them on a Dask cluster.")
 @click.option("--vehicle", default=None, help="With --case: bundled vehicle or vehicle file, not the case's.")
 @click.option(
     "--reference",
@@ -225,6 +226,7 @@ def validate(
     strict: bool,
     samples: int | None,
     seed: int,
+    dask: str | None,
     **own: Any,
 ) -> None:
     """Fly a maneuver from the database and compare it with its references.
@@ -232,6 +234,7 @@ def validate(
     \b
     Example: ident validate --case hzz20 --json -
              ident validate --case hzz20 --samples 1000
+             ident validate --case hzz20 --samples 100000 --dask tcp://scheduler:8786
              ident validate --case turn20-4m --reference mine.csv --frame program
              ident validate --case turning-circle --vehicle my_boat.toml
              ident validate --all
@@ -243,6 +246,8 @@ def validate(
         raise click.UsageError("give either --case NAME or --all")
     if every and (samples or any(own.values())):
         raise click.UsageError("--samples, --vehicle, --reference and --frame go with --case")
+    if dask and not samples:
+        raise click.UsageError("--dask goes with --samples")
     if own["frame"] and not own["reference"]:
         raise click.UsageError("--frame goes with --reference")
     if out.exists() and not out.is_dir():
@@ -254,7 +259,7 @@ def validate(
         raise InputError(f"case {case or 'of --all'}", str(error), "a state the boat can hold") from error
     from ident.figures import case_figure
 
-    bands = _bands(done[0], result, samples, seed, console) if samples else None
+    bands = _bands(done[0], result, samples, seed, dask, console) if samples else None
     for one in done:
         figure = case_figure(one, out / f"{one.case.name}_v{one.result['database']['version']}.png", bands)
         console.print(f"figure: {figure}", highlight=False)
@@ -275,7 +280,7 @@ def _one(
     return [done], done.result
 
 
-def _bands(one: Any, result: dict[str, Any], samples: int, seed: int, console: Any) -> Any:
+def _bands(one: Any, result: dict[str, Any], samples: int, seed: int, dask: str | None, console: Any) -> Any:
     """Fly the samples with a progress bar; adds ``bands`` to the result and prints it."""
     from rich.progress import Progress
 
@@ -283,7 +288,12 @@ def _bands(one: Any, result: dict[str, Any], samples: int, seed: int, console: A
 
     with Progress(console=console, transient=True) as progress:
         task = progress.add_task("flying samples", total=samples)
-        found = fly_samples(one.case, one.vehicle, one.rows, samples, seed, each=lambda: progress.advance(task))
+
+        def each(done: int) -> None:
+            progress.advance(task, done)
+
+        boat = one.boat
+        found = fly_samples(one.case, boat.vehicle, boat.rows, samples, seed, each=each, dask=dask)
     result["bands"] = summary(found, one.case, one.reference)
     show(result["bands"], console)
     return found

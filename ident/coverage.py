@@ -7,49 +7,53 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sim import kernel
+from sim.catalogue import feature_index
 from sim.coefficients import Coefficient, Coefficients
-from sim.forces import boat_features, plane_features
 from sim.simulate import Simulation
 
 Array = NDArray[np.float64]
-Features = dict[str, float]
 # Samples of a record that are looked at: enough for a share of time.
 _COVERAGE_SAMPLES = 200
 
 
-def _states(simulation: Simulation, coefficients: Coefficients) -> list[tuple[Features, dict[str, Features]]]:
-    """Boat features, and features by plane, at evenly spread samples of a record."""
+def _features(simulation: Simulation, model: kernel.Model) -> Array:
+    """(samples, features) of the kernel at evenly spread samples of a record."""
     chosen = np.unique(np.linspace(0, len(simulation.record) - 1, _COVERAGE_SAMPLES).astype(int))
-    found: list[tuple[Features, dict[str, Features]]] = []
-    columns = {c: simulation.record[chosen, i] for i, c in enumerate(simulation.columns)}
-    wake = coefficients.get("w_T")
-    factor = 1.0 - (float(wake.values[0]) if wake else 0.0)
-    vehicle = coefficients.vehicle
-    for i in range(len(chosen)):
-        velocity = [columns[c][i] for c in "uvw"]
-        rates = [columns[c][i] for c in "pqr"]
-        n = columns["n"][i]
-        advance = factor * velocity[0] / (n * vehicle.propeller.diameter.value) if n else 0.0
-        boat = boat_features(velocity, rates, columns["z"][i] + simulation.depth_offset, n, advance)
-        planes = {p.name: plane_features(p, velocity, rates, columns[p.name][i]) for p in vehicle.planes}
-        found.append((boat, planes))
+    # Columns: t, states, controls, the two commands.
+    record = np.ascontiguousarray(simulation.record[chosen])
+    work = kernel.workspace(len(model.planes))
+    found = np.empty((len(chosen), work.features.size))
+    for row, sample in zip(found, record, strict=True):
+        kernel.fill_features(model, sample[1:13], sample[13:-2], work.features)
+        row[:] = work.features
     return found
 
 
 def outside_tables(
-    simulation: Simulation, coefficients: Coefficients
+    simulation: Simulation, coefficients: Coefficients, model: kernel.Model
 ) -> tuple[list[dict[str, Any]], dict[str, list[str]]]:
-    """Share of time each term was used beyond its data, and its one-valued axes."""
-    states = _states(simulation, coefficients)
+    """Share of time each term was used beyond its data, and its one-valued axes.
+
+    Parameters
+    ----------
+    simulation, coefficients, model : A flight, and what was flown.
+
+    Returns
+    -------
+    found : ``term``, ``axis`` and ``fraction_of_time``, one entry a term and axis.
+    constant : Term -> axes along which it was measured at one value only.
+    """
+    features = _features(simulation, model)
+    planes = [p.name for p in coefficients.vehicle.planes]
     found: list[dict[str, Any]] = []
     constant: dict[str, list[str]] = {}
     for coefficient in coefficients:
         term, table = coefficient.term, coefficient.table
         if term.is_acceleration or not term.axes:
             continue
-        points = np.array(
-            [[{**boat, **planes.get(coefficient.part, {})}[a] for a in term.axes] for boat, planes in states]
-        )
+        plane = planes.index(coefficient.part) if coefficient.part in planes else -1
+        points = features[:, [feature_index(a, plane) for a in term.axes]]
         for k, axis in enumerate(term.axes):
             low, high = table.range(axis)
             if low == high and term.extrapolation[axis] != "absent":
@@ -71,5 +75,5 @@ def _combined(coefficient: Coefficient, points: Array) -> list[dict[str, Any]]:
     varied = [a for a in ("alpha", "beta") if coefficient.table.range(a)[0] < coefficient.table.range(a)[1]]
     if len(varied) < 2:
         return []
-    share = float(np.mean([coefficient.table.covered(x) < 0.5 for x in points]))
+    share = float(np.mean(coefficient.table.covered(points) < 0.5))
     return [{"term": coefficient.term.name, "axis": "alpha x beta", "fraction_of_time": share}] if share else []

@@ -7,16 +7,16 @@ from typing import Any
 import numpy as np
 
 from sim.case import Case
-from sim.coefficients import Coefficients
-from sim.simulate import initial_state, model_of
+from sim.kernel import Model
+from sim.simulate import initial_state
 from sim.trim import NoEquilibrium
+from sim.vehicle import Vehicle
 
 
-def _grid(case: Case, coefficients: Coefficients) -> list[dict[str, Any]]:
+def _grid(case: Case, vehicle: Vehicle, model: Model) -> list[dict[str, Any]]:
     """Self-propulsion at every speed and depth of a sweep; ``reason`` where there is none."""
-    vehicle, found = coefficients.vehicle, []
+    found: list[dict[str, Any]] = []
     names = ("n_rps", "pitch_deg", "heel_deg", "dV_deg", "dH_deg", "ballast_kg", "trim_tank_m")
-    model = model_of(case, coefficients)
     assert case.sweep is not None
     for speed in case.sweep.speed_mps:
         for depth in case.sweep.depth_m:
@@ -36,11 +36,11 @@ def _grid(case: Case, coefficients: Coefficients) -> list[dict[str, Any]]:
     return found
 
 
-def with_grid(case: Case, coefficients: Coefficients, metrics: dict[str, Any]) -> dict[str, Any]:
+def with_grid(case: Case, vehicle: Vehicle, model: Model, metrics: dict[str, Any]) -> dict[str, Any]:
     """The grid of a sweep for the result; its revolutions are added to ``metrics``."""
     if case.sweep is None:
         return {}
-    grid = _grid(case, coefficients)
+    grid = _grid(case, vehicle, model)
     labels = {label: None for columns in metrics.values() for label in columns} | {"simulated": None}
     for point in grid:
         name = f"n_rps_{point['speed_mps']:.4g}mps_{point['depth_m']:g}m"

@@ -9,19 +9,18 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from ident.boats import Boat, Fleet
 from ident.coverage import outside_tables
 from ident.measure import measured
 from ident.sweep import with_grid
 from sim.case import Case, Reference, Series, load_case, load_reference, read_series
-from sim.coefficients import Coefficients
-from sim.database import axis_columns, own_version, read_rows
+from sim.database import axis_columns
 from sim.errors import InputError
 from sim.schema import FrameData
-from sim.simulate import CHANNELS, Simulation, simulate
-from sim.vehicle import Vehicle, load_vehicle
+from sim.simulate import CHANNELS, Simulation, fly
+from sim.vehicle import load_vehicle
 
 if TYPE_CHECKING:
-    import pandas as pd
     from rich.console import Console
 
 Array = NDArray[np.float64]
@@ -40,7 +39,7 @@ class Validation:
     case, simulation, reference : What was flown and what it is held against.
     result : The JSON object of the comparison.
     constant_axes : Term -> axes along which it was measured at one value only.
-    vehicle, rows : What was flown.
+    boat : The vehicle with its coefficients.
     own : Flights from the start of a source's record, by source.
     """
 
@@ -49,8 +48,7 @@ class Validation:
     reference: Series
     result: dict[str, Any]
     constant_axes: dict[str, list[str]]
-    vehicle: Vehicle
-    rows: pd.DataFrame
+    boat: Boat
     own: dict[str, Simulation]
 
 
@@ -131,16 +129,39 @@ def _error(
     return entry
 
 
-def _errors(
-    case: Case, simulation: Simulation, reference: Series, own: dict[str, Simulation] | None = None
-) -> dict[str, Any]:
-    """Errors by source and channel; ``own`` holds the runs from a source's own start."""
+def flights(case: Case, boat: Boat) -> tuple[Simulation, dict[str, Simulation]]:
+    """A case flown, and flown from the start of each source's record that has one of its own.
+
+    Raises
+    ------
+    sim.trim.NoEquilibrium
+        When the case starts from self-propulsion and there is none.
+    """
+    model = boat.model(case)
+    started = {s: case.started_as(s) for s in (case.reference.compare if case.reference else [])}
+    own = {s: fly(c, boat.vehicle, model) for s, c in started.items() if c is not None}
+    return fly(case, boat.vehicle, model), own
+
+
+def errors(case: Case, reference: Series, simulation: Simulation, own: dict[str, Simulation]) -> dict[str, Any]:
+    """Errors by source and channel.
+
+    Parameters
+    ----------
+    case, reference : What was flown, and what it is held against.
+    simulation, own : From ``flights``.
+
+    Raises
+    ------
+    InputError
+        When the reference begins after the run ends.
+    """
     found: dict[str, Any] = {}
     if case.reference is None:
         return found
     published = reference[case.reference.published_model or ""]
     for source in case.reference.compare:
-        flown = (own or {}).get(source, simulation)
+        flown = own.get(source, simulation)
         found[source] = {
             channel: _error(flown, reference, source, channel, published)
             for channel in case.reference.channels
@@ -149,9 +170,9 @@ def _errors(
     return found
 
 
-def _passed(case: Case, errors: dict[str, Any]) -> bool:
+def _passed(case: Case, found: dict[str, Any]) -> bool:
     for tolerance in case.tolerance:
-        entry = errors.get(tolerance.source, {}).get(tolerance.channel)
+        entry = found.get(tolerance.source, {}).get(tolerance.channel)
         if entry is None or entry["unit"] != tolerance.unit:
             raise InputError(
                 f"case {case.name}, tolerance on {tolerance.source} {tolerance.channel} [{tolerance.unit}]",
@@ -207,6 +228,7 @@ def validate(
     vehicle_name: str | None = None,
     reference_file: Path | None = None,
     reference_frame: str | None = None,
+    fleet: Fleet | None = None,
 ) -> Validation:
     """Fly a case from a database version and compare.
 
@@ -218,6 +240,7 @@ def validate(
     vehicle_name : Bundled vehicle or path to a vehicle file, instead of the case's.
     reference_file, reference_frame : A user's own reference instead of the case's, and its
         frame, ``source`` or ``program``; the case's when None.
+    fleet : The database version, where more than one case is flown from it.
 
     Raises
     ------
@@ -234,30 +257,27 @@ def validate(
     check_reference(case, reference, where)
     vehicle = load_vehicle(vehicle_name) if vehicle_name else load_vehicle(case.vehicle, beside=where)
     case = case.model_copy(update={"vehicle": vehicle.name})
-    rows, number = read_rows(db, version, vehicle.name)
-    coefficients = Coefficients(vehicle, rows)
-    simulation = simulate(case, coefficients)
-    started = {s: case.started_as(s) for s in (case.reference.compare if case.reference else [])}
-    own = {s: simulate(c, coefficients) for s, c in started.items() if c is not None}
-    errors = _errors(case, simulation, reference, own)
+    boat = (fleet or Fleet(db, version)).boat(vehicle)
+    simulation, own = flights(case, boat)
+    found = errors(case, reference, simulation, own)
     metrics, curve = measured(case, simulation, reference, own)
-    grid = with_grid(case, coefficients, metrics)
-    outside, constant = outside_tables(simulation, coefficients)
-    commit = own_version(db, vehicle.name, number)
+    model = boat.model(case)
+    grid = with_grid(case, vehicle, model, metrics)
+    outside, constant = outside_tables(simulation, boat.coefficients, model)
     result = {
         "case": case.name,
         "vehicle": vehicle.name,
-        "database": {"path": db, "version": commit.number, "digest": commit.digest},
-        "references": errors,
+        "database": {"path": db, "version": boat.commit.number, "digest": boat.commit.digest},
+        "references": found,
         "metrics": metrics,
         "outside_tables": outside,
         **({"curve": curve} if curve else {}),
         **grid,
         "trim_limited": list(simulation.trim.limited) if simulation.trim else [],
         "ends_s": float(simulation.end[0]),
-        "passed": bool(_complete(simulation) and _passed(case, errors) and _published_met(case, metrics)),
+        "passed": bool(_complete(simulation) and _passed(case, found) and _published_met(case, metrics)),
     }
-    return Validation(case, simulation, reference, result, constant, vehicle, rows, own)
+    return Validation(case, simulation, reference, result, constant, boat, own)
 
 
 def _complete(simulation: Simulation) -> bool:

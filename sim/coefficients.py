@@ -49,11 +49,15 @@ class Coefficients:
     ------
     catalogue.CatalogueError
         When a row names a coefficient the vehicle's term set does not have.
+
+    Attributes
+    ----------
+    places : (symbol, part) -> places of its values among the rows.
     """
 
     def __init__(self, vehicle: Vehicle, rows: pd.DataFrame) -> None:
         self.vehicle = vehicle
-        self._rows: dict[tuple[str, str], NDArray[np.int64]] = {}
+        self.places: dict[tuple[str, str], NDArray[np.int64]] = {}
         columns = {axis: column for column, axis in axis_columns().items()}
         known = {t.name: t for t in vehicle_terms(vehicle)}
         self._all: dict[tuple[str, str], Coefficient] = {}
@@ -70,7 +74,7 @@ class Coefficients:
             ).reshape(len(group), len(used))
             rules = tuple(term.extrapolation[a] for a in term.axes)
             values = group["value"].to_numpy(dtype=float)
-            self._rows[name, part] = group.index.to_numpy(dtype=np.int64)
+            self.places[name, part] = group.index.to_numpy(dtype=np.int64)
             self._all[name, part] = Coefficient(term, part, Table(term.axes, rules, points), values)
 
     def __iter__(self) -> Iterator[Coefficient]:
@@ -84,7 +88,7 @@ class Coefficients:
         values : One value a database row, in the order of the rows this was made from.
         """
         other = copy(self)
-        other._all = {k: replace(c, values=values[self._rows[k]]) for k, c in self._all.items()}
+        other._all = {k: replace(c, values=values[self.places[k]]) for k, c in self._all.items()}
         return other
 
     def get(self, name: str, part: str | None = None) -> Coefficient | None:

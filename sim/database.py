@@ -180,6 +180,12 @@ def own_version(path: str, vehicle: str, number: int) -> Version:
     vehicle : Vehicle name.
     number : Version that holds the rows.
     """
-    history = [v for v in versions(path) if v.number <= number]
-    own = [v for v in history if v.metadata.get("vehicle", vehicle) == vehicle]
-    return (own or history or [Version(number, "", {})])[-1]
+    history = versions(path)
+    up_to = [v for v in history if v.number <= number]
+    return last_own(history, vehicle, number) or (up_to or [Version(number, "", {})])[-1]
+
+
+def last_own(history: list[Version], vehicle: str, number: int) -> Version | None:
+    """The last commit of a vehicle's rows up to version ``number``, of a history oldest first."""
+    own = [v for v in history if v.number <= number and v.metadata.get("vehicle", vehicle) == vehicle]
+    return own[-1] if own else None

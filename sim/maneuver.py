@@ -14,7 +14,7 @@ import numpy as np
 from numba import njit
 
 from sim.events import HORIZONTAL, REVOLUTIONS, RUN, VERTICAL, Programme, Progress, advance, progress, step_past, watch
-from sim.kernel import Model, Work, rk4, workspace
+from sim.kernel import Model, Work, rhs, rk4, workspace
 
 FIXED, PID, ZIGZAG, PROGRAMME, YAW_RATE = 0, 1, 2, 3, 4
 N_COMMANDS, N_INTEGRALS = 5, 10
@@ -299,9 +299,7 @@ def run(
     if zigzag:
         executes[0, 0], executes[0, 1], events = 0.0, s.value[axis], 1
     for step in range(steps + 1):
-        rk4(m, y, c, rate, 0.0, work, stages, trial)
-        for i in range(12):
-            dy[i] = stages[0, i]
+        rhs(m, y, c, work, dy)
         if programmed:
             watch(s.programme, state, y, dy, step * dt)
         autopilot(s, y, dy, state, integrals, dt, command)

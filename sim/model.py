@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_array
 
 from sim import kernel
 from sim.catalogue import ACCELERATIONS, BOAT_FEATURES, OUTPUTS, PLANE_FEATURES, feature_index
@@ -49,32 +50,35 @@ def rigid_body_matrix(vehicle: Vehicle) -> tuple[Array, Array]:
     return np.block([[m * np.eye(3), -m * lever], [m * lever, inertia]]), inertia
 
 
-def added_mass_matrix(coefficients: Coefficients, environment: Environment) -> Array:
-    """Added mass about the origin.
+def _added_masses(coefficients: Coefficients, environment: Environment) -> list[tuple[Coefficient, Array]]:
+    """Each acceleration coefficient in use, with the (6, 6) added mass of a value of one.
 
     From sections, Eqs. (36)-(41): A = sum J^T diag(c m) J with J = [1, -[r]x]; or from the
     whole-boat derivatives, as the vehicle declares.
-
-    Returns
-    -------
-    (6, 6) [kg, kg m, kg m^2]; zero when nothing was identified.
     """
     vehicle = coefficients.vehicle
     length, diameter = vehicle.particulars.length.value, vehicle.propeller.diameter.value
-    total = np.zeros((6, 6))
+    found = []
     centres = {s.name: s.position for s in vehicle.sections.centres} if vehicle.sections else {}
     for coefficient in coefficients:
         term = coefficient.term
         if not term.is_acceleration or (coefficient.part in centres) != (vehicle.added_mass == "sections"):
             continue
-        load = term.scale(environment.density, length, diameter) * float(coefficient.values[0])
+        unit, load = np.zeros((6, 6)), term.scale(environment.density, length, diameter)
         i, j = OUTPUTS.index(term.output), ACCELERATIONS.index(term.factors[0])
         if coefficient.part in centres:
             motion = np.hstack([np.eye(3), -cross_matrix(centres[coefficient.part])])
-            total -= load * np.outer(motion[i], motion[j])
+            unit = -load * np.outer(motion[i], motion[j])
         else:
-            total[i, j] -= load
-    return total
+            unit[i, j] = -load
+        found.append((coefficient, unit))
+    return found
+
+
+def added_mass_matrix(coefficients: Coefficients, environment: Environment) -> Array:
+    """Added mass about the origin, (6, 6) [kg, kg m, kg m^2]; zero when nothing was identified."""
+    parts = _added_masses(coefficients, environment)
+    return np.array(sum((float(c.values[0]) * unit for c, unit in parts), np.zeros((6, 6))))
 
 
 def _refine(grid: Array, axis: int, old: Array, new: Array) -> Array:
@@ -83,6 +87,20 @@ def _refine(grid: Array, axis: int, old: Array, new: Array) -> Array:
         return grid
     matrix = np.stack([np.interp(new, old, unit) for unit in np.eye(old.size)], axis=1)
     return np.moveaxis(np.tensordot(matrix, grid, axes=(1, axis)), 0, axis)
+
+
+def _union(members: list[Coefficient]) -> list[Array]:
+    """Axis values of a group: all of its members'."""
+    axes = range(len(members[0].term.axes))
+    return [np.unique(np.concatenate([m.table.extension[k][0] for m in members])) for k in axes]
+
+
+def _on(union: list[Array], member: Coefficient, values: Array) -> Array:
+    """A member's grid on the axes of its group, from (n,) values or (n, k) sets of them."""
+    grid = member.table.grid(values)
+    for k, nodes in enumerate(union):
+        grid = _refine(grid, k, member.table.extension[k][0], nodes)
+    return grid
 
 
 def _group_key(coefficient: Coefficient) -> tuple[object, ...]:
@@ -136,15 +154,8 @@ class _Flat:
     def add_group(self, members: list[Coefficient]) -> None:
         first = members[0]
         rules = _group_key(first)[1]
-        union = [
-            np.unique(np.concatenate([m.table.extension[k][0] for m in members])) for k in range(len(first.term.axes))
-        ]
-        grids = []
-        for member in members:
-            grid = member.table.grid(member.values)
-            for k, nodes in enumerate(union):
-                grid = _refine(grid, k, member.table.extension[k][0], nodes)
-            grids.append(grid)
+        union = _union(members)
+        grids = [_on(union, member, member.values) for member in members]
         grids += [np.zeros_like(grids[0])] * (kernel.WIDTH - len(grids))
         block = np.stack(grids, axis=-1)
         start = len(self.link)
@@ -190,9 +201,15 @@ def weight_across(model: kernel.Model, lateral: float) -> kernel.Model:
     )
 
 
-def _batches(members: list[Coefficient]) -> Iterable[list[Coefficient]]:
-    for i in range(0, len(members), kernel.WIDTH):
-        yield members[i : i + kernel.WIDTH]
+def _batches(coefficients: Coefficients) -> Iterable[list[Coefficient]]:
+    """Coefficients that share their axes, at most ``WIDTH`` at a time, in the order of the kernel."""
+    groups: dict[tuple[object, ...], list[Coefficient]] = {}
+    for coefficient in coefficients:
+        if not coefficient.term.is_acceleration and coefficient.term.name != "w_T":
+            groups.setdefault(_group_key(coefficient), []).append(coefficient)
+    for members in groups.values():
+        for i in range(0, len(members), kernel.WIDTH):
+            yield members[i : i + kernel.WIDTH]
 
 
 def assemble(coefficients: Coefficients, environment: Environment) -> kernel.Model:
@@ -208,14 +225,9 @@ def assemble(coefficients: Coefficients, environment: Environment) -> kernel.Mod
     Model of flat arrays, program frame, SI and radians.
     """
     vehicle = coefficients.vehicle
-    groups: dict[tuple[object, ...], list[Coefficient]] = {}
-    for coefficient in coefficients:
-        if not coefficient.term.is_acceleration and coefficient.term.name != "w_T":
-            groups.setdefault(_group_key(coefficient), []).append(coefficient)
     flat = _Flat(coefficients, environment)
-    for members in groups.values():
-        for batch in _batches(members):
-            flat.add_group(batch)
+    for batch in _batches(coefficients):
+        flat.add_group(batch)
     mass, inertia = rigid_body_matrix(vehicle)
     wake = coefficients.get("w_T")
     particulars = vehicle.particulars
@@ -245,3 +257,49 @@ def assemble(coefficients: Coefficients, environment: Environment) -> kernel.Mod
         mass_matrix=total,
         tank=(),
     )
+
+
+class Assembly:
+    """A vehicle's tables as one linear map from row values to the kernel's data.
+
+    Tables are completed, extended and refined once; each further set of values costs one
+    sparse product, and gives what ``assemble`` gives to round-off.
+
+    Parameters
+    ----------
+    coefficients, environment : As for ``assemble``.
+    """
+
+    def __init__(self, coefficients: Coefficients, environment: Environment) -> None:
+        self._base = assemble(coefficients, environment)
+        places = coefficients.places
+        weight, node, row, first = [np.zeros(0)], [np.zeros(0, dtype=int)], [np.zeros(0, dtype=int)], 0
+        for members in _batches(coefficients):
+            union = _union(members)
+            for slot, member in enumerate(members):
+                grid = _on(union, member, np.eye(member.values.size)).reshape(-1, member.values.size)
+                i, j = np.nonzero(grid)
+                weight.append(grid[i, j])
+                node.append((first + i) * kernel.WIDTH + slot)
+                row.append(places[member.term.name, member.part][j])
+            first += int(np.prod([nodes.size for nodes in union]))
+        shape = (self._base.data.size, sum(p.size for p in places.values()))
+        entries = (np.concatenate(weight), (np.concatenate(node), np.concatenate(row)))
+        self._data = csr_array(entries, shape=shape)
+        parts = _added_masses(coefficients, environment)
+        self._added = np.array([places[c.term.name, c.part][0] for c, _ in parts], dtype=int)
+        self._units = np.array([unit for _, unit in parts]).reshape(-1, 6, 6)
+        self._rigid = rigid_body_matrix(coefficients.vehicle)[0]
+        wake = coefficients.get("w_T")
+        self._wake = int(places[wake.term.name, wake.part][0]) if wake else None
+
+    def model(self, values: Array) -> kernel.Model:
+        """The kernel's model at (rows,) values, in the order of the rows of the coefficients."""
+        # einsum and not BLAS: the sum does not depend on how many threads BLAS may use.
+        total = self._rigid + np.einsum("k,kij->ij", values[self._added], self._units)
+        return self._base._replace(
+            data=(self._data @ values).reshape(-1, kernel.WIDTH),
+            mass_matrix=total,
+            inverse_mass=np.linalg.inv(total),
+            wake=0.0 if self._wake is None else float(values[self._wake]),
+        )

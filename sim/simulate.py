@@ -26,6 +26,8 @@ CHANNELS = dict.fromkeys(("u", "v", "w", "U"), "m/s") | dict.fromkeys(("p", "q",
 CHANNELS |= dict.fromkeys(("x", "y", "z", "D0"), "m") | dict.fromkeys(("phi", "theta", "psi"), "rad")
 CHANNELS |= {"u_over_U0": "-", "dz_over_L0": "-", "n": "1/s", "ballast": "kg", "trim_tank": "m"}
 TANKS = ("ballast", "trim_tank")
+# What a simulation gives beside the columns of its record.
+DERIVED = ("U", "D0", "s", "u_over_U0", "dz_over_L0")
 
 
 @dataclass(frozen=True)
@@ -56,7 +58,7 @@ class Simulation:
     end: Array
 
     def __getitem__(self, column: str) -> Array:
-        """One column by name; ``U``, ``D0``, ``s``, ``u_over_U0`` and ``dz_over_L0`` are derived.
+        """One column by name; those of ``DERIVED``, are computed.
 
         ``s`` is the length of the path over ground, in the horizontal plane [m].
         """
@@ -71,6 +73,17 @@ class Simulation:
         if column == "dz_over_L0":
             return (self["z"] - self["z"][0]) / self.length
         return self.record[:, self.columns.index(column)]
+
+
+def columns_of(vehicle: Vehicle, tanks: bool) -> tuple[str, ...]:
+    """Columns of a record, with or without tanks in use."""
+    return ("t", *_STATES, *[p.name for p in vehicle.planes], "n", *(TANKS if tanks else ()), "dV", "dH")
+
+
+def samples_of(case: Case) -> tuple[int, int]:
+    """Number of control samples of a run, and of those between two records."""
+    dt = case.run.step_s
+    return round(case.run.duration_s / dt), max(1, round(case.run.record_s / dt))
 
 
 def mixer_of(vehicle: Vehicle, sail_planes: bool = True) -> Array:
@@ -182,14 +195,19 @@ def settings_of(case: Case, vehicle: Vehicle, state: Array, controls: Array, tri
     )
 
 
-def simulate(case: Case, coefficients: Coefficients, model: Model | None = None) -> Simulation:
-    """Fly a case.
+def simulate(case: Case, coefficients: Coefficients) -> Simulation:
+    """Fly a case with the coefficients of its vehicle; raises as ``model_of`` and ``fly``."""
+    return fly(case, coefficients.vehicle, model_of(case, coefficients))
+
+
+def fly(case: Case, vehicle: Vehicle, model: Model) -> Simulation:
+    """Fly a case with an assembled model.
 
     Parameters
     ----------
     case : From ``load_case``.
-    coefficients : Of the case's vehicle.
-    model : What ``model_of`` gave for them, where it is flown more than once.
+    vehicle : The case's.
+    model : From ``model_of``, which may be flown more than once.
 
     Returns
     -------
@@ -199,22 +217,15 @@ def simulate(case: Case, coefficients: Coefficients, model: Model | None = None)
     ------
     sim.trim.NoEquilibrium
         When the case starts from self-propulsion and there is none.
-    InputError
-        When the case uses tanks that the vehicle does not have.
     """
-    vehicle = coefficients.vehicle
-    if model is None:
-        model = model_of(case, coefficients)
     state, controls, trim = initial_state(case, vehicle, model)
     if trim and trim.lateral:
         model = weight_across(model, trim.lateral)
     settings = settings_of(case, vehicle, state, controls, trim)
-    dt = case.run.step_s
-    steps, every = round(case.run.duration_s / dt), max(1, round(case.run.record_s / dt))
+    dt, (steps, every) = case.run.step_s, samples_of(case)
     flown = maneuver.fly_logged(model, settings, state, controls, dt, steps, every)
-    tanks = TANKS if model.tank else ()
     return Simulation(
-        columns=("t", *_STATES, *[p.name for p in vehicle.planes], "n", *tanks, "dV", "dH"),
+        columns=columns_of(vehicle, bool(model.tank)),
         record=flown.record,
         executes=flown.executes,
         trim=trim,
@@ -233,8 +244,22 @@ def model_of(case: Case, coefficients: Coefficients) -> Model:
     InputError
         When the vehicle has no tanks.
     """
-    vehicle = coefficients.vehicle
-    model = assemble(coefficients, Environment(case.environment.density_kgpm3, case.environment.gravity_mps2))
+    return equipped(case, coefficients.vehicle, assemble(coefficients, environment_of(case)))
+
+
+def environment_of(case: Case) -> Environment:
+    """Water and gravity of a case."""
+    return Environment(case.environment.density_kgpm3, case.environment.gravity_mps2)
+
+
+def equipped(case: Case, vehicle: Vehicle, model: Model) -> Model:
+    """An assembled model with tanks, when the case uses them.
+
+    Raises
+    ------
+    InputError
+        When the vehicle has no tanks.
+    """
     if not uses_tanks(case):
         return model
     if vehicle.tanks is None:

@@ -63,6 +63,13 @@ def axis_weights(nodes: Array, rule: str, x: float) -> Array:
     return weights
 
 
+def _weight_rows(nodes: Array, rule: str, x: Array) -> Array:
+    """``axis_weights`` at (m,) values, (m, n)."""
+    if rule in ("linear", "linear_load"):
+        return np.stack([axis_weights(nodes, rule, float(value)) for value in x])
+    return np.stack([np.interp(x, nodes, unit) for unit in np.eye(nodes.size)], axis=1)
+
+
 def _odd_row(nodes: Array, x: float) -> Array:
     """Weights of the nodes for the value at ``x`` of an in-plane load, Eq. (25).
 
@@ -258,28 +265,43 @@ class Table:
             return np.ones(1)
         return self.grid_weights(x) @ self.completion
 
-    def covered(self, x: Sequence[float]) -> float:
-        """Share of the interpolation weight at ``x`` that rests on runs, 0 to 1."""
+    def covered(self, x: Array) -> Array:
+        """Share of the interpolation weight that rests on runs, 0 to 1.
+
+        Parameters
+        ----------
+        x : (m, d) states.
+
+        Returns
+        -------
+        (m,) shares; zero where all weights are zero.
+        """
+        x = np.asarray(x, dtype=float)
         if not self.axes:
-            return 1.0
-        weights = np.abs(self.grid_weights(x))
-        total = weights.sum()
-        return float(weights[self.measured].sum() / total) if total else 0.0
+            return np.ones(len(x))
+        # Weights are products along the axes, so that one axis at a time is summed.
+        runs = np.broadcast_to(self.measured.reshape([n.size for n in self.nodes]), (len(x), *map(len, self.nodes)))
+        total = np.ones(len(x))
+        for k, ((extended, matrix), rule) in enumerate(zip(self.extension, self.rules, strict=True)):
+            along = np.abs(_weight_rows(extended, rule, x[:, k]) @ matrix)
+            runs = np.einsum("mi,mi...->m...", along, runs)
+            total = total * along.sum(axis=1)
+        return np.divide(runs, total, out=np.zeros(len(x)), where=total > 0.0)
 
     def grid(self, values: Array) -> Array:
         """Values on the extended grid.
 
         Parameters
         ----------
-        values : (n,) values at the measured points.
+        values : (n,) values at the measured points, or (n, k), k sets of them.
 
         Returns
         -------
-        Array with one dimension an axis.
+        Array with one dimension an axis, and k last where there are k sets.
         """
         if not self.axes:
-            return np.asarray(values, dtype=float).reshape(())
-        out = (self.completion @ values).reshape([n.size for n in self.nodes])
+            return np.asarray(values, dtype=float).reshape(values.shape[1:])
+        out = (self.completion @ values).reshape([*(n.size for n in self.nodes), *values.shape[1:]])
         for k, (_, matrix) in enumerate(self.extension):
             out = np.moveaxis(np.tensordot(matrix, out, axes=(1, k)), 0, k)
         return out

@@ -84,9 +84,7 @@ def test_a_gap_between_two_runs_of_a_line_is_interpolated():
 def test_covered_is_one_on_runs_and_zero_on_completed_corners():
     points = np.array([(-1.0, 0.0), (0.0, 0.0), (1.0, 0.0), (0.0, 1.0)])
     table = Table(("a", "b"), ("hold", "hold"), points)
-    assert table.covered((0.5, 0.0)) == 1.0
-    assert table.covered((1.0, 1.0)) == 0.0
-    assert table.covered((0.5, 1.0)) == pytest.approx(0.5)
+    assert table.covered([(0.5, 0.0), (1.0, 1.0), (0.5, 1.0)]) == pytest.approx([1.0, 0.0, 0.5])
 
 
 # -- weights -----------------------------------------------------------------------------
