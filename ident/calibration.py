@@ -153,16 +153,12 @@ def load_calibration(name: str | Path) -> tuple[CalibrationFile, str, str]:
         For a missing file, an unknown key, or a value out of range.
     """
     known = bundled_calibrations()
-    if str(name) in known:
-        path = files("ident") / "calibrations" / f"{name}.toml"
-        with_name: str | Path = str(path)
-    elif Path(name).suffix == ".toml":
-        with_name = name
-    else:
-        raise InputError(
-            str(name)[:200], "no such calibration", f"one of {', '.join(known)}, or a path to a .toml file"
-        )
-    data, where = read_toml(with_name, "cases")
+    inside = files("ident") / "calibrations" / f"{name}.toml"
+    path = Path(str(inside)) if str(name) in known else Path(name)
+    if path.suffix != ".toml" or not path.is_file():
+        allowed = f"one of {', '.join(known)}, or a path to a .toml file"
+        raise InputError(str(name)[:200], "no such calibration", allowed)
+    data, where = read_toml(path, "cases")
     digest = hashlib.sha256(Path(where).read_bytes()).hexdigest()
     return checked(CalibrationFile, data, where), where, digest
 

@@ -60,9 +60,10 @@ def moved(tables, point: tuple[float, float, float], hand: int):
     for name, table in tables.items():
         table = table.copy()
         moments = [f"{m}_Nm" for m in "KMN" if f"{m}_Nm" in table]
+        given = (table[moments] != "").any(axis=1)
         for force in "XYZ" if moments else ():
             column = table.get(f"{force}_N", pd.Series("", index=table.index))
-            table[f"{force}_N"] = column.mask(column == "", "0")
+            table[f"{force}_N"] = column.mask((column == "") & given, "0")
         if moments:
             fx, fy, fz = (number(table[f"{o}_N"]) for o in "XYZ")
             for moment, arm in (("K", y * fz - z * fy), ("M", z * fx - x * fz), ("N", x * fy - y * fx)):

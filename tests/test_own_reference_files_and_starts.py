@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from importlib.resources import files
 
 import numpy as np
@@ -133,10 +134,21 @@ def test_reading_error_is_reported_and_not_taken_off(fitted_db):
     assert found["reference_sigma"] == pytest.approx(np.sqrt(np.mean(sigma**2)))
 
 
-def test_source_with_its_own_start_is_held_against_a_flight_from_there(fitted_db, coefficients):
+def _with_its_own_start(folder):
+    """hzz20 as a case file of one's own, EXP compared from the speed its record starts at."""
+    (folder / "data").mkdir()
+    shutil.copy(DATA / "hzz20.csv", folder / "data" / "hzz20.csv")
+    text = (DATA.parent / "hzz20.toml").read_text("utf-8").replace("upright = true", "upright = false")
+    start = '[reference.initial.EXP]\nspeed_mps = 4.93\nsource = "first value"\n\n[reference.frame]'
+    path = folder / "hzz20.toml"
+    path.write_text(text.replace("[reference.frame]", start), encoding="utf-8")
+    return str(path)
+
+
+def test_source_with_its_own_start_is_held_against_a_flight_from_there(fitted_db, coefficients, tmp_path):
     """hzz20: EXP starts at 4.93 m/s, CFD at 5.14; each its own flight, the metrics of both."""
-    case, where = load_case("hzz20")
-    done = validate("hzz20", fitted_db)
+    case, where = load_case(_with_its_own_start(tmp_path))
+    done = validate(where, fitted_db)
     own = case.started_as("EXP")
     assert own.initial.speed_mps == 4.93
     assert case.started_as("CFD") is None
@@ -150,9 +162,9 @@ def test_source_with_its_own_start_is_held_against_a_flight_from_there(fitted_db
     assert done.result["metrics"]["execute_2_s"]["simulated_as_EXP"] == pytest.approx(flights["EXP"].executes[1, 0])
 
 
-def test_bands_of_a_source_with_its_own_start_start_there(campaign, rows):
+def test_bands_of_a_source_with_its_own_start_start_there(campaign, rows, tmp_path):
     """Without any error every band is the flight: u starts at 4.93 m/s for EXP, 5.14 for CFD."""
-    case, where = load_case("hzz20")
+    case, where = load_case(_with_its_own_start(tmp_path))
     case = case.model_copy(deep=True)
     case.run.duration_s = 5.0
     exact = rows.assign(stderr=0.0)

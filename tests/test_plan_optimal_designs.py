@@ -202,7 +202,7 @@ def bb2_plan(campaign):
 def test_the_plan_names_the_gaps_of_the_bundled_campaign(bb2_plan):
     """model.md, section 10: pure yaw, vp, vq, wr, pq, qr, rp, alpha with beta, beyond 12 deg."""
     rows = {(r["coefficient"], r["why"]): r for r in bb2_plan.summary()}
-    for name in ("Z_vp", "M_vp", "Y_vq", "N_vq", "Y_wr", "N_wr", "Y_pq", "K_qr", "X_rp", "M_rp", "X_vr", "Y_up"):
+    for name in ("Z_vp", "M_vp", "Y_vq", "N_vq", "Y_wr", "N_wr", "Y_pq", "K_qr", "X_rp", "M_rp", "Z_rp", "K_vq"):
         assert rows[name, "no run"]["now"] is None
         assert rows[name, "no run"]["planned"] is not None
     for name in ("Y_uvw", "N_uvw", "Z_uvw", "M_uvw"):

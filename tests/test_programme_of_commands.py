@@ -47,7 +47,7 @@ def test_zigzag_written_as_steps_is_the_zigzag(coefficients):
     """dH -20 until psi < -5, 20 until psi > 5, and so on: the same events, the same path."""
     case = load_case("hzz20")[0].model_copy(deep=True)
     case.command.dH.check_deg = 5.0
-    case.run.duration_s = 260.0
+    case.run.duration_s = 130.0
     zigzag = simulate(case, coefficients)
     sides = [-1.0, 1.0, -1.0, 1.0]
     until = [[{"channel": "psi", "below" if s < 0 else "above": 5.0 * s}] for s in sides]

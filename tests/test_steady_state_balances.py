@@ -20,6 +20,7 @@ def turn(coefficients):
     case = load_case("hzz20")[0].model_copy(deep=True)
     case.command.dH.law, case.command.dH.value_deg = "fixed", 5.0
     case.command.n.law, case.command.n.P_u, case.command.n.I_u = "pid", 14.65, 1.465
+    case.initial.upright = False  # the weight stays where the vehicle file has it
     case.run.duration_s, case.run.step_s, case.run.record_s = 2500.0, 0.05, 0.05
     return simulate(case, coefficients)
 
