@@ -36,6 +36,22 @@ class FrameData(Data):
             raise InputError(where, str(error), "a right-handed frame") from error
 
 
+# Larger numbers are slips of the pen, and their powers leave the floating-point range.
+_LARGEST = 1e15
+
+
+def _too_large(data: Any, key: str = "") -> tuple[str, str] | None:
+    """The first number of parsed data that no file means, with its key."""
+    if isinstance(data, dict):
+        parts = ((f"{key}.{k}" if key else str(k), v) for k, v in data.items())
+    elif isinstance(data, list):
+        parts = ((f"{key}[{i}]", v) for i, v in enumerate(data))
+    else:
+        number = isinstance(data, int | float) and not isinstance(data, bool)
+        return (key, str(data)[:24]) if number and abs(data) > _LARGEST else None
+    return next((found for k, v in parts if (found := _too_large(v, k))), None)
+
+
 Checked = TypeVar("Checked", bound=Data)
 
 
@@ -47,6 +63,9 @@ def checked(kind: type[Checked], data: dict[str, Any], where: str) -> Checked:
     InputError
         Naming ``where`` and the first key that is missing, unknown or out of range.
     """
+    large = _too_large(data)
+    if large:
+        raise InputError(f"{where}, key {large[0]}", large[1], f"a number of size {_LARGEST:g} at most")
     try:
         return kind.model_validate(data)
     except ValidationError as error:

@@ -7,6 +7,7 @@ from importlib.resources import files
 import pytest
 
 from ident.validate import validate
+from sim.case import load_case
 from sim.errors import InputError
 
 TEXT = (files("sim") / "cases" / "roll-decay.toml").read_text("utf-8")
@@ -82,3 +83,12 @@ def test_mistake_in_a_reference_is_named(write, fitted_db, old, new, words):
         validate(write(series=SERIES.replace(old, new)), fitted_db)
     for word in words:
         assert word in str(caught.value)
+
+
+@pytest.mark.parametrize("number", ["1e300", "-2e16", "1" + "0" * 400])
+def test_a_number_no_file_means_is_refused_with_its_key(tmp_path, number):
+    text = (files("sim") / "cases" / "hzz20.toml").read_text("utf-8")
+    path = tmp_path / "large.toml"
+    path.write_text(text.replace("depth_m = 25.0", f"depth_m = {number}"), encoding="utf-8")
+    with pytest.raises(InputError, match=r"initial\.depth_m"):
+        load_case(str(path))
