@@ -108,7 +108,8 @@ def turn(runs: pd.DataFrame, frame: Frame, angles: str) -> pd.DataFrame:
     return turned
 
 
-def _applies(runs: pd.DataFrame, tare: Tare) -> pd.Series:
+def tare_applies(runs: pd.DataFrame, tare: Tare) -> pd.Series:
+    """Which runs a tare is taken off: (runs,) of bool."""
     chosen = pd.Series(True, index=runs.index)
     if tare.tests:
         chosen &= runs["test"].isin(tare.tests)
@@ -127,7 +128,7 @@ def without_tare(runs: pd.DataFrame, tares: list[Tare], where: str) -> pd.DataFr
     """
     out = runs.copy()
     for k, tare in enumerate(tares):
-        chosen = _applies(runs, tare)
+        chosen = tare_applies(runs, tare)
         place = f"{where}, key tare.{k}"
         for output, text in tare.loads.items():
             out.loc[chosen, output] = out.loc[chosen, output] - quantity_of(text, output, f"{place}.loads.{output}")
