@@ -274,7 +274,7 @@ def _channels(
         for block in sheet.numbers([i for i, _ in wanted]):
             yield block * factors
 
-    yield "", Channels(path, names, pieces)
+    yield "", Channels(path, names, pieces, sheet.first_row)
 
 
 def _openfoam(path: Path, source: Source, header: CampaignFile, where: str) -> Iterator[tuple[str, Channels]]:
