@@ -9,7 +9,9 @@ names a place. A few dozen examples a reader here; ``IDENT_MUTATIONS=10000`` for
 
 from __future__ import annotations
 
+import json
 import os
+import shutil
 import warnings
 from pathlib import Path
 
@@ -21,8 +23,10 @@ from hypothesis import strategies as st
 from made_campaigns import STEADY, campaign, history
 from test_files_of_each_format import MAP, PATTERNS, PLAIN, ROWS, STAR, tidy
 from test_openfoam_versions import PARTS, REAL, SOURCE, STATE, VERSIONS
+from test_quality_checks_from_a_campaign_folder import CONFIGURED, ship
 
 from ident.campaign import read_campaign
+from ident.checks import check_campaign
 from ident.identify import identify
 from ident.store import commit, database_rows
 from sim.catalogue import OUTPUTS
@@ -121,6 +125,38 @@ def survives(folder: Path, fit: bool = False) -> None:
     assert (np.isfinite(loads) | loads.isna()).all(axis=None)
     if rows is not None:
         assert np.isfinite(rows[["value", "stderr"]].to_numpy()).all()
+
+
+@MUTATED
+@given(data=st.data())
+def test_damaged_campaigns_are_checked(tmp_path, data):
+    """Quality checks of whatever can be read: findings or a refusal, and no warning."""
+    folder = tmp_path / "ship"
+    if not folder.exists():
+        printed = "coefficient,value\nY_v,-0.021\nN_v,-0.009\nY_vdot,-0.0146\n"
+        ship(folder, 1.0, 'reference = "printed.csv"\nconfigurations = "named.csv"', printed)
+        (folder / "named.csv").write_text(CONFIGURED)
+        for path in folder.glob("*.csv"):
+            shutil.copy(path, tmp_path)
+    hit = data.draw(st.sampled_from(["runs.csv", "printed.csv", "named.csv"]))
+    for path in tmp_path.glob("*.csv"):
+        content = path.read_bytes()
+        (folder / path.name).write_bytes(
+            damaged(content, data.draw(damage(len(content)))) if path.name == hit else content
+        )
+    for one in checked_or_refused(folder):
+        assert one.what
+        json.dumps(one.as_json(), allow_nan=False)
+
+
+def checked_or_refused(folder: Path) -> list:
+    """Findings on a campaign; none where it is refused."""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", RuntimeWarning)
+            return check_campaign(read_campaign(folder), folder)
+    except InputError:
+        return []
 
 
 MONITORS = STAR[:6000].rsplit("\n", 1)[0].replace("(N-m)", "")
