@@ -219,12 +219,13 @@ def test_damaged_parquet(tmp_path, data):
 
 
 HEADER = SOURCE + "rho_inf = 1.0\nvehicle_origin = [0.5, 0.0, 0.0]\n" + PARTS + STATE + STEADY
+HEADER += "[source.within]\nbeta_deg = [-20.0, 20.0]\n"
 
 
 @MUTATED
 @given(data=st.data())
 def test_damaged_campaign_file(tmp_path, data):
-    campaign(tmp_path, HEADER)
+    campaign(tmp_path, HEADER, tables='reference = "printed.csv"')
     if not (tmp_path / "run").exists():
         (tmp_path / "run").symlink_to(REAL)
     path = tmp_path / "campaign.toml"
