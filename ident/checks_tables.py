@@ -119,6 +119,8 @@ def length_over_draught(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
     known, step = _values(evidence.derivatives), body.length / body.draught
     other = _values(evidence.reference) if evidence.reference is not None else {}
     ratios = {n: abs(v / other[n][0]) for n, (v, _, _) in known.items() if other.get(n, (0.0,))[0] and v}
+    # A ratio that leaves the floating-point range is no factor L/d.
+    ratios = {n: r for n, r in ratios.items() if 0.0 < r < math.inf}
     for claim, factor in (("1/2 rho L d, not 1/2 rho L^2", step), ("1/2 rho L^2, not 1/2 rho L d", 1.0 / step)):
         near = {n: r for n, r in ratios.items() if abs(math.log(r / factor)) < math.log1p(rule.limits["share"])}
         if near and len(near) > len(ratios) / 2:

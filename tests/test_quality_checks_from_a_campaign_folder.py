@@ -185,6 +185,23 @@ def test_loads_against_derivatives_printed_elsewhere(tmp_path):
     assert any({"Yv", "Nv"} == set(f.columns) and "L/d = 15.39" in f.what for f in wrong), wrong
 
 
+def test_a_drift_series_without_side_force_is_no_rudder(tmp_path):
+    """Found on damaged files: with two columns exchanged the slope of Y over beta is zero."""
+    folder = ship(tmp_path / "c")
+    table = pd.read_csv(folder / "runs.csv").assign(**{"Y [-]": 0.0})
+    table.to_csv(folder / "runs.csv", index=False)
+    assert not found(folder, "angle_name")
+
+
+def test_a_printed_value_out_of_all_range_is_no_other_norm(tmp_path):
+    printed = "coefficient,value\nY_v,1e-310\nN_v,-1e15\n"
+    assert not found(ship(tmp_path / "c", 1.0, 'reference = "printed.csv"', printed), "norm")
+    tiny = pd.DataFrame({"coefficient": ["Y_v"], "value": [1e-320]})
+    other = pd.DataFrame({"coefficient": ["Y_v"], "value": [1e10]})
+    body = Body(LENGTH, DENSITY, 3123.0, None, 0.448)
+    assert not checked(Evidence(derivatives=tiny, reference=other, body=body), "norm")
+
+
 CONFIGURED = "configuration,appendages\nConfig 3,hull+sail\nA,hull\nB,hull+sail\n"
 
 
