@@ -253,6 +253,16 @@ def test_a_refused_campaign_leaves_the_database_as_it_was(tmp_path):
     pd.testing.assert_frame_equal(read_rows(db, vehicle="bb2")[0], read_rows(db, 0, "bb2")[0])
 
 
+@pytest.mark.parametrize("name", ["b2", "b2.toml"])
+def test_a_slip_in_the_name_of_the_vehicle_names_the_campaign_file(tmp_path, name):
+    """Found by damaging campaign files."""
+    campaign(tmp_path, tidy())
+    path = tmp_path / "campaign.toml"
+    path.write_text(path.read_text().replace('"bb2"', f'"{name}"'))
+    with pytest.raises(InputError, match=r"campaign\.toml, key vehicle: '.*b2.*: no such file"):
+        read_campaign(tmp_path)
+
+
 def test_folders_and_unreadable_files_are_refused(tmp_path):
     campaign(tmp_path, tidy())
     (tmp_path / "runs.csv").mkdir()
