@@ -288,6 +288,8 @@ def standard_errors(runs: pd.DataFrame, header: CampaignFile, length: float) -> 
         if f"size_{name}" in out:
             size = size.where(out[f"size_{name}"].isna(), out[f"size_{name}"])
         prime = (size / dynamic).where(dynamic > 0) if name in OUTPUTS else size
+        # An excluded load is no measure of what the others can be read to.
+        prime = prime.where(~out["exclude"].map(lambda text, name=name: name in text.split()).astype(bool))
         worst = prime.groupby([out["test"], out["part"], kind]).transform("max").fillna(0.0)
         floor = header.uncertainty.floor * worst * (dynamic if name in OUTPUTS else 1.0)
         ruled = quality * out["rel_sigma"] * np.maximum(size, floor)
