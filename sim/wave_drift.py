@@ -29,22 +29,25 @@ TWO_PI = 2.0 * np.pi
 # Headings at which a wave's loads are worked out (harmonics up to half of it), and of the table.
 _DIRECTIONS, _HEADINGS = 48, 72
 # Frequencies at which a seaway of more components is worked out; nodes of depth and of speed.
-_FREQUENCIES, _DEPTHS, _SPEEDS = 14, 33, 4
-# Depths of the free surface's answer, as least depth over depth; at infinity there is none.
-_SHARES = np.array([0.25, 0.5, 0.75, 1.0])
+_FREQUENCIES, _DEPTHS, _SPEEDS = 14, 41, 4
+# Depths of the free surface's answer, as least depth over depth: none at infinity; nearer than
+# the last, where dipoles do not see the surface right, it is held.
+_SHARES = np.linspace(0.0, 0.825, 5)
 
 
 class Drift(NamedTuple):
     """Mean loads over speed, heading and depth; without waves an empty table.
 
-    loads : (speeds, headings, depths, 6) level axes (x to the bow, y to starboard, z down)
-        about the body origin [N, N m]; headings once round from north; depths evenly in
-        exp(-decay z) from 0 (no waves) to ``closest``. speed_step [m/s] from zero on.
+    loads : (speeds, headings, depths, 6) over exp(-decay z), level axes (x to the bow, y to
+        starboard, z down) about the body origin [N, N m]; headings once round from north;
+        depths evenly in least/z from 0 (deep) to 1. speed_step [m/s] from zero on.
+    decay : Twice the longest wave's number [1/m]. least : Depth of the origin above which
+        the loads are held: the highest point at the surface [m].
     """
 
     loads: Array
     decay: float
-    closest: float
+    least: float
     speed_step: float
 
 
@@ -102,14 +105,13 @@ def tabulate(body: DipoleBody, waves: Waves, least: float, top_speed: float = 0.
     from scipy.interpolate import CubicSpline
 
     speeds = np.linspace(0.0, top_speed, _SPEEDS) if top_speed > 0.0 else np.zeros(1)
-    decay, closest = 2.0 * waves.number.min(), exp(-2.0 * waves.number.min() * least)
-    with np.errstate(divide="ignore"):
-        depths = -np.log(np.linspace(0.0, closest, _DEPTHS)) / decay
+    decay, share = 2.0 * waves.number.min(), np.linspace(0.0, 1.0, _DEPTHS)
+    depths = least / np.maximum(share, 1e-9)
     headings = TWO_PI * np.arange(_DIRECTIONS) / _DIRECTIONS
     frequencies, height = _frequencies(waves), -float(body.points[:, 2].min())
     direct, answered = [], []
     for w in frequencies:
-        found = mean_loads(body, w, headings, speeds, least / _SHARES)
+        found = mean_loads(body, w, headings, speeds, least / _SHARES[1:])
         # Per orbital velocity squared at the highest point and wave number they hardly depend on frequency.
         size = w**4 / body.gravity * np.exp(2.0 * w**2 / body.gravity * height)
         direct.append(found.direct / size)
@@ -121,17 +123,16 @@ def tabulate(body: DipoleBody, waves: Waves, least: float, top_speed: float = 0.
     for values in (direct, answered):
         each = _at_components(frequencies, np.array(values), waves)
         parts.append(np.fft.rfft(each, axis=2)[:, :, : harmonic.size] * turned)
-    weight = np.exp(-2.0 * np.outer(depths - height, waves.number))
+    weight = np.exp(np.outer(depths, decay - 2.0 * waves.number) + 2.0 * height * waves.number)
     weight *= waves.amplitude**2 * waves.frequency**2 * waves.number
-    nodes = np.eye(_SHARES.size + 1)[:, 1:]
-    near = CubicSpline(np.concatenate([[0.0], _SHARES]), nodes)(least / depths)
+    near = CubicSpline(_SHARES, np.eye(_SHARES.size)[:, 1:])(np.minimum(share, _SHARES[-1]))
     total = np.einsum("zj,jsnc->szcn", weight, parts[0])
     total = total + np.einsum("zj,zd,jdnc->zcn", weight, near, parts[1], optimize=True)
     ahead = np.exp(-1j * np.outer(harmonic, TWO_PI * np.arange(_HEADINGS) / _HEADINGS))
     ahead[1:] *= 2.0
     loads = np.real(total @ ahead) / _DIRECTIONS
     step = float(speeds[1]) if speeds.size > 1 else 1.0
-    return Drift(np.ascontiguousarray(loads.transpose(0, 3, 1, 2)), float(decay), closest, step)
+    return Drift(np.ascontiguousarray(loads.transpose(0, 3, 1, 2)), float(decay), least, step)
 
 
 @njit(cache=True, error_model="numpy")
@@ -147,7 +148,8 @@ def add_mean(drift: Drift, y: Array, out: Array) -> None:
     loads = drift.loads
     if loads.shape[0] == 0:
         return
-    near = min(exp(-drift.decay * y[8]), drift.closest) / drift.closest * (loads.shape[2] - 1)
+    depth = max(y[8], drift.least)
+    size, near = exp(-drift.decay * depth), drift.least / depth * (loads.shape[2] - 1)
     d = min(int(near), loads.shape[2] - 2)
     near -= d
     turn = y[11] / TWO_PI
@@ -162,7 +164,7 @@ def add_mean(drift: Drift, y: Array, out: Array) -> None:
     for half in range(2):
         level = (0.0, 0.0, 0.0)
         for k in range(loads.shape[0] if loads.shape[0] < 2 else 2):
-            speed = fast if k else 1.0 - fast
+            speed = size * (fast if k else 1.0 - fast)
             for side in range(2):
                 row = loads[s + k, after if side else h]
                 share = speed * (turn if side else 1.0 - turn)
