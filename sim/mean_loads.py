@@ -144,7 +144,7 @@ def plane_waves(body: DipoleBody, number: float, angles: Array) -> tuple[Complex
     -------
     kappa : (m, 3) grad f / f [1/m]; fields : (m, n, 3) grad f at the points of the body [1/m].
     """
-    kappa = number * np.stack([1j * np.cos(angles), 1j * np.sin(angles), -np.ones_like(angles)], axis=-1)
+    kappa: Complex = number * np.stack([1j * np.cos(angles), 1j * np.sin(angles), -np.ones_like(angles)], axis=-1)
     return kappa, np.exp(kappa @ body.points.T)[:, :, None] * kappa[:, None, :]
 
 
@@ -204,9 +204,7 @@ def _paired(waves: Complex, kappa: Complex, share: Array) -> Array:
     both, twice = np.concatenate([real, imaginary]), 2.0 * np.concatenate([share, share])
     fall = np.concatenate([kappa[:, 2].real] * 2)
     across = [(imaginary.T * (-2.0 * share * kappa[:, k].imag)) @ real for k in range(2)]
-    return np.stack(
-        [(both.T * twice) @ both, *(a - a.T for a in across), (both.T * (twice * fall)) @ both],
-    )
+    return np.stack([(both.T * twice) @ both, *(a - a.T for a in across), (both.T * (twice * fall)) @ both])
 
 
 def _image_numbers(number: float, depth: float) -> tuple[Array, Array]:
@@ -232,6 +230,7 @@ def surface_answer(body: DipoleBody, number: float, depth: float) -> tuple[Compl
     -------
     velocity : (3 n, 3 n) by the dipoles [1/kg]; gradient : (3, 3 n, 3 n) its x, y, z derivatives.
     """
+
     def summed(numbers: Array, weights: Array) -> Array:
         waves, kappas, shares = [], [], []
         for m, weight in zip(numbers, weights, strict=True):

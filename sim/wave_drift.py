@@ -160,22 +160,21 @@ def add_mean(drift: Drift, y: Array, out: Array) -> None:
     fast = min(max(y[0] / drift.speed_step, 0.0), loads.shape[0] - 1.0)
     s = min(int(fast), max(loads.shape[0] - 2, 0))
     fast -= s
+    x = z = yy = k = m = n = 0.0
+    for corner in range(8 if loads.shape[0] > 1 else 4):
+        share = size * (near if corner & 1 else 1.0 - near) * (turn if corner & 2 else 1.0 - turn)
+        share *= fast if corner & 4 else 1.0 - fast
+        a, b, c = s + (corner >> 2), after if corner & 2 else h, d + (corner & 1)
+        x += share * loads[a, b, c, 0]
+        yy += share * loads[a, b, c, 1]
+        z += share * loads[a, b, c, 2]
+        k += share * loads[a, b, c, 3]
+        m += share * loads[a, b, c, 4]
+        n += share * loads[a, b, c, 5]
     st, ct, sf, cf = sin(y[10]), cos(y[10]), sin(y[9]), cos(y[9])
-    for half in range(2):
-        level = (0.0, 0.0, 0.0)
-        for k in range(loads.shape[0] if loads.shape[0] < 2 else 2):
-            speed = size * (fast if k else 1.0 - fast)
-            for side in range(2):
-                row = loads[s + k, after if side else h]
-                share = speed * (turn if side else 1.0 - turn)
-                a, b = share * (1.0 - near), share * near
-                i = 3 * half
-                level = (
-                    level[0] + a * row[d, i] + b * row[d + 1, i],
-                    level[1] + a * row[d, i + 1] + b * row[d + 1, i + 1],
-                    level[2] + a * row[d, i + 2] + b * row[d + 1, i + 2],
-                )
-        x, yy, z = level
-        out[3 * half] += ct * x - st * z
-        out[3 * half + 1] += sf * st * x + cf * yy + sf * ct * z
-        out[3 * half + 2] += cf * st * x - sf * yy + cf * ct * z
+    out[0] += ct * x - st * z
+    out[1] += sf * (st * x + ct * z) + cf * yy
+    out[2] += cf * (st * x + ct * z) - sf * yy
+    out[3] += ct * k - st * n
+    out[4] += sf * (st * k + ct * n) + cf * m
+    out[5] += cf * (st * k + ct * n) - sf * m
