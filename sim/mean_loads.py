@@ -144,7 +144,8 @@ def plane_waves(body: DipoleBody, number: float, angles: Array) -> tuple[Complex
     -------
     kappa : (m, 3) grad f / f [1/m]; fields : (m, n, 3) grad f at the points of the body [1/m].
     """
-    kappa: Complex = number * np.stack([1j * np.cos(angles), 1j * np.sin(angles), -np.ones_like(angles)], axis=-1)
+    towards = np.stack([1j * np.cos(angles), 1j * np.sin(angles), -np.ones_like(angles)], axis=-1)
+    kappa = number * towards.astype(np.complex128)
     return kappa, np.exp(kappa @ body.points.T)[:, :, None] * kappa[:, None, :]
 
 
