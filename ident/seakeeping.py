@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -36,6 +36,9 @@ _FEWEST_PERIODS = 3.0
 # Samples by which the frequency is refined; more tell nothing new.
 _REFINED_BY = 1000
 _STEPS = 30
+# Blocks a period, at most (half as many at least): coarse enough that what is left of a motion
+# that is nearly periodic is no autoregression on the edge of stability.
+_BLOCKS = 32.0
 # A phase that is not known is uniform on the circle.
 _ANY_PHASE = math.pi / math.sqrt(3.0)
 
@@ -228,7 +231,8 @@ def refined(encounter: Encounter, time: Array, values: Array, order: int = 1) ->
 
 def _fit(encounter: Encounter, time: Array, values: Array, names: list[str], order: int, cut: bool) -> Fitted:
     regressors = _regressors(encounter, float(time[0]), float(time[-1]), order)
-    condensed = condense.Condensed(regressors, values.shape[1])
+    periods = (time[-1] - time[0]) * encounter.frequency / (2.0 * math.pi)
+    condensed = condense.Condensed(regressors, values.shape[1], most=math.ceil(_BLOCKS * periods))
     condensed.add(time, values)
     try:
         return fit_history(condensed, names, transient=cut)
@@ -248,12 +252,13 @@ def _enough(encounter: Encounter, time: Array) -> None:
         raise InputError("harmonics in waves", found, f"{2 * _HARMONICS + 2} or more; a shorter record_s")
 
 
-def _one(
-    name: str, unit: str, c: int, fit: Fitted, verdict: str, encounter: Encounter, order: int, cut: bool
-) -> Harmonics:
+def _one(name: str, unit: str, c: int, fit: Fitted, encounter: Encounter, order: int) -> Harmonics:
     """Values of one channel as amplitudes and phases, errors by the delta method."""
     b, covariance = fit.values[:, c], fit.covariance[c]
     ends = drift_columns(fit.start, fit.end, order)(np.array([fit.start, fit.end]))
+    # A residual that is nearly one line leaves an autoregression on the edge of stability, whose
+    # variances come out at nothing: no error is smaller than that of uncorrelated residuals.
+    least = float(np.square(fit.channels[:, c] - fit.model[:, c]).mean()) / len(fit.time)
     amplitude, phase, errors = np.zeros(_HARMONICS), np.zeros(_HARMONICS), np.zeros((2, _HARMONICS))
     for k in range(_HARMONICS):
         s, cosine = b[2 * k + 1 : 2 * k + 3]
@@ -262,16 +267,16 @@ def _one(
         amplitude[k], phase[k] = size, math.atan2(-s, cosine)
         if size > 0.0:
             along, across = np.array([s, cosine]) / size, np.array([-cosine, s]) / size
-            errors[0, k] = math.sqrt(max(float(along @ own @ along), 0.0))
-            errors[1, k] = min(math.sqrt(max(float(across @ own @ across), 0.0)) / size, _ANY_PHASE)
+            errors[0, k] = math.sqrt(max(float(along @ own @ along), 2.0 * least))
+            errors[1, k] = min(math.sqrt(max(float(across @ own @ across), 2.0 * least)) / size, _ANY_PHASE)
         else:
-            errors[:, k] = math.sqrt(max(float(np.trace(own)) / 2.0, 0.0)), _ANY_PHASE
+            errors[:, k] = math.sqrt(max(float(np.trace(own)) / 2.0, 2.0 * least)), _ANY_PHASE
     # The drift's mean over the window is zero, so that harmonic 0 is the mean of the rest.
     return Harmonics(
         channel=name,
         unit=unit,
         mean=float(b[0]),
-        mean_stderr=math.sqrt(max(float(covariance[0, 0]), 0.0)),
+        mean_stderr=math.sqrt(max(float(covariance[0, 0]), least)),
         amplitude=amplitude,
         amplitude_stderr=errors[0],
         phase=phase,
@@ -279,8 +284,8 @@ def _one(
         drift=float((ends[1] - ends[0]) @ b[2 * _HARMONICS + 1 :]),
         start=fit.start,
         end=fit.end,
-        cut=cut,
-        verdict=verdict,
+        cut=fit.cut,
+        verdict=fit.verdict,
         encounter=encounter,
     )
 
@@ -346,19 +351,18 @@ def harmonics_of(
     InputError
         As ``harmonics``.
     """
-    names, whole = list(channels), len(time)
+    names = list(channels)
     encounter = encounter_of(waves, time, *track.T)
     _enough(encounter, time)
-    encounter = refined(encounter, time, values, drift)
-    first = fit = _fit(encounter, time, values, names, drift, cut=True)
-    if first.cut:
-        # Everything again on the window alone; a record too short to be cut is used whole.
-        left = (first.end - first.start) * encounter.frequency / (2.0 * math.pi)
-        use = time >= first.start - 1e-9 if left >= _FEWEST_PERIODS else np.ones(time.size, dtype=bool)
-        time, values, track = time[use], values[use], track[use]
-        encounter = refined(encounter_of(waves, time, *track.T), time, values, drift)
-        fit = _fit(encounter, time, values, names, drift, cut=False)
-    return {
-        name: _one(name, unit, c, fit, first.verdict, encounter, drift, len(time) < whole)
-        for c, (name, unit) in enumerate(channels.items())
-    }
+    # A start-up would turn the frequency; it may take the first half and no more.
+    half = time >= 0.5 * (time[0] + time[-1])
+    early = _fit(refined(encounter, time[half], values[half], drift), time, values, names, drift, cut=True)
+    left = (time[-1] - early.start) * encounter.frequency / (2.0 * math.pi)
+    # A record too short to be cut is used whole; its verdict says so.
+    cut = early.cut and left >= _FEWEST_PERIODS
+    use = time >= early.start if cut else np.ones(time.size, dtype=bool)
+    time, values, track = time[use], values[use], track[use]
+    encounter = refined(encounter_of(waves, time, *track.T), time, values, drift)
+    fit = _fit(encounter, time, values, names, drift, cut=False)
+    fit = replace(fit, start=float(time[0]), end=float(time[-1]), cut=cut, verdict=early.verdict)
+    return {name: _one(name, unit, c, fit, encounter, drift) for c, (name, unit) in enumerate(channels.items())}

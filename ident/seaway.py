@@ -25,9 +25,11 @@ from sim.waves import Waves, kinematics
 Array = NDArray[np.float64]
 
 _FEWEST_CROSSINGS = 10
-# Block means a zero-crossing period by which standard errors are found: the squares have half
-# the period, and an autoregression of order 30 must span some of theirs.
-_BLOCKS = 8.0
+# Errors of means are found from block means of about a zero-crossing period (between half and
+# one): what oscillates faster averages out, and the slow rest is what such errors come from.
+# Finer blocks of a narrow-band motion leave an autoregression on the edge of stability.
+_BLOCKS = 1.0
+_FEWEST_BLOCKS = 16
 # Segments a record is cut into for its spectrum, before they overlap by half.
 _SEGMENTS = 16
 
@@ -182,7 +184,7 @@ def zero_crossing(time: Array, values: Array) -> tuple[float, Array]:
 
 
 def _fit(time: Array, values: Array, regressors: condense.Regressors, blocks: float, cut: bool) -> reduction.Fitted:
-    condensed = condense.Condensed(regressors, 1, most=max(int(blocks), 64))
+    condensed = condense.Condensed(regressors, 1, most=max(int(blocks), _FEWEST_BLOCKS))
     condensed.add(time, values[:, None])
     try:
         return reduction.fit_history(condensed, ["X"], transient=cut)
