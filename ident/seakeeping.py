@@ -224,7 +224,7 @@ def refined(encounter: Encounter, time: Array, values: Array, order: int = 1) ->
         found = _at(found, found.frequency + change, middle)
         if not abs(found.frequency - encounter.frequency) < half:
             return encounter
-        if abs(change) < 1e-9 * half:
+        if abs(change) < 1e-6 * half:
             return found
     return encounter
 
