@@ -36,6 +36,72 @@ def animate(
     Example: ident animate --case hzz20 --db coeff_db --out hzz20.gif
              ident animate --case vzz10-10kt --frames 100 --end 120
     """
-    from ident.animation import film
-
     film(case, db, version, vehicle, out, (frames, fps, start, end), json_path)
+
+
+def film(
+    case: str,
+    db: str,
+    version: int | None,
+    vehicle: str | None,
+    out: Path | None,
+    pictures: tuple[int, float, float | None, float | None],
+    json_path: str | None,
+) -> None:
+    """Fly a case as ``ident validate`` does, draw it with a progress bar, and say what was drawn.
+
+    Parameters
+    ----------
+    case, db, version, vehicle : As for ``ident.validate.validate``.
+    out : File; the case's name as GIF when None.
+    pictures : Number of frames, frames a second, start and end [s] or None.
+    json_path : Where to write what was drawn as JSON, ``-`` for standard output.
+
+    Raises
+    ------
+    InputError
+        As ``validate`` and ``animate``.
+    """
+    from rich.console import Console
+    from rich.progress import Progress
+
+    from ident.animation import animate as draw
+    from ident.animation import writer_of
+    from ident.cli import _emit
+    from ident.validate import validate
+    from sim.errors import InputError
+    from sim.trim import NoEquilibrium
+
+    frames, fps, start, end = pictures
+    console = Console(quiet=json_path == "-")
+    if out is not None:
+        writer_of(out, fps)
+    try:
+        with console.status("flying the case"):
+            done = validate(case, db, version, vehicle)
+    except NoEquilibrium as error:
+        raise InputError(f"case {case}", str(error), "a state the boat can hold") from error
+    database = done.result["database"]
+    title = (
+        f"{done.case.title}, {done.case.vehicle}; database version {database['version']} ({database['digest'][:16]})"
+    )
+    path = out or Path(f"{done.case.name}.gif")
+    with Progress(console=console, transient=True) as progress:
+        task = progress.add_task("drawing", total=frames)
+        draw(
+            done.simulation,
+            done.boat.vehicle,
+            None,
+            path,
+            frames=frames,
+            fps=fps,
+            title=title,
+            start=start,
+            end=end,
+            each=lambda: progress.advance(task),
+        )
+    size = path.stat().st_size
+    console.print(f"animation: {path}, {frames} frames, {size / 1e6:.2g} MB", highlight=False)
+    if json_path:
+        shown = {"case": done.case.name, "database": database, "file": str(path), "frames": frames, "fps": fps}
+        _emit(shown | {"bytes": size}, json_path)
