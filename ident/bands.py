@@ -17,8 +17,9 @@ from sim.case import Case, Series, in_radians
 from sim.coefficients import Coefficients
 from sim.database import correlation_pairs
 from sim.errors import InputError
+from sim.in_waves import Water
 from sim.model import Assembly
-from sim.simulate import DERIVED, columns_of, environment_of, equipped, fly, samples_of, uses_tanks
+from sim.simulate import DERIVED, columns_of, environment_of, equipped, fly, samples_of, uses_tanks, water_of
 from sim.trim import NoEquilibrium
 from sim.vehicle import Vehicle
 
@@ -120,12 +121,14 @@ class Batch:
     vehicle : Of the case.
     assembly : Row values to the model.
     channels : Names of what a flight gives.
+    water : Waves and surface, with the sections' added mass at its database values.
     """
 
     flights: dict[str, Case]
     vehicle: Vehicle
     assembly: Assembly
     channels: tuple[str, ...]
+    water: Water | None
 
     def fly(self, values: Array) -> list[dict[str, Array] | None]:
         """Fly one sample after the other.
@@ -142,7 +145,10 @@ class Batch:
         for sample in values:
             model = self.assembly.model(sample)
             try:
-                flown = {s: fly(c, self.vehicle, equipped(c, self.vehicle, model)) for s, c in self.flights.items()}
+                flown = {
+                    s: fly(c, self.vehicle, equipped(c, self.vehicle, model), self.water)
+                    for s, c in self.flights.items()
+                }
             except NoEquilibrium:
                 found.append(None)
                 continue
@@ -153,13 +159,15 @@ class Batch:
 def batch_of(case: Case, vehicle: Vehicle, rows: pd.DataFrame) -> Batch:
     """The batch of a case; raises ``InputError`` when it uses tanks that the vehicle lacks."""
     started = {s: case.started_as(s) for s in (case.reference.compare if case.reference else [])}
-    assembly = Assembly(Coefficients(vehicle, rows), environment_of(case))
+    coefficients = Coefficients(vehicle, rows)
+    assembly = Assembly(coefficients, environment_of(case))
     equipped(case, vehicle, assembly.model(rows["value"].to_numpy()))
     return Batch(
         flights={"": case} | {s: c for s, c in started.items() if c is not None},
         vehicle=vehicle,
         assembly=assembly,
         channels=(*columns_of(vehicle, uses_tanks(case)), *DERIVED),
+        water=water_of(case, coefficients),
     )
 
 

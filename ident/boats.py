@@ -11,9 +11,10 @@ from sim.case import Case
 from sim.coefficients import Coefficients
 from sim.database import Version, last_own, read_rows, versions
 from sim.errors import InputError
+from sim.in_waves import Water
 from sim.kernel import Model
 from sim.model import Environment, assemble
-from sim.simulate import environment_of, equipped
+from sim.simulate import environment_of, equipped, water_of
 from sim.vehicle import Vehicle
 
 if TYPE_CHECKING:
@@ -46,6 +47,10 @@ class Boat:
             if environment not in self._models:
                 self._models[environment] = assemble(self.coefficients, environment)
         return equipped(case, self.vehicle, self._models[environment])
+
+    def water(self, case: Case) -> Water | None:
+        """Waves and surface of a case around the boat; raises as ``sim.simulate.water_of``."""
+        return water_of(case, self.coefficients)
 
 
 class Fleet:

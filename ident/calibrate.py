@@ -29,8 +29,9 @@ from ident.validate import check_reference
 from sim.case import Case, Series, load_case, load_reference
 from sim.coefficients import Coefficients
 from sim.errors import InputError
+from sim.in_waves import Water
 from sim.model import Assembly, Environment
-from sim.simulate import Simulation, environment_of, equipped, fly
+from sim.simulate import Simulation, environment_of, equipped, fly, water_of
 from sim.trim import NoEquilibrium
 from sim.vehicle import Vehicle
 
@@ -122,7 +123,7 @@ class Problem:
         for name, (case, _) in self.cases.items():
             model = equipped(case, self.vehicle, self._assembly(case).model(values))
             try:
-                flown[name] = fly(case, self.vehicle, model)
+                flown[name] = fly(case, self.vehicle, model, self._water(case))
             except NoEquilibrium:
                 flown[name] = None
         found = []
@@ -141,8 +142,14 @@ class Problem:
             _CACHE[environment] = (self.rows, assembly)
         return _CACHE[environment][1]
 
+    def _water(self, case: Case) -> Water | None:
+        if case.name not in _WATERS or _WATERS[case.name][0] is not self.rows:
+            _WATERS[case.name] = (self.rows, water_of(case, Coefficients(self.vehicle, self.rows)))
+        return _WATERS[case.name][1]
+
 
 _CACHE: dict[Environment, tuple[pd.DataFrame, Assembly]] = {}
+_WATERS: dict[str, tuple[pd.DataFrame, Water | None]] = {}
 
 
 @dataclass(frozen=True)

@@ -292,7 +292,7 @@ def run(
     return Calibrated(summary, number, new, digest(done))
 
 
-_FIT = ("options", "unused", "warnings", "quality", "checks")
+_FIT = ("conversions", "options", "unused", "warnings", "quality", "checks")
 
 
 def show(done: Calibrated, console: Console) -> None:

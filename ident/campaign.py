@@ -7,6 +7,7 @@ program frame, SI and radians, with a standard error for every load.
 
 from __future__ import annotations
 
+import glob
 import hashlib
 from dataclasses import dataclass, field
 from functools import cache
@@ -86,10 +87,12 @@ def _sources(folder: Path, header: CampaignFile) -> list[Source]:
     """The sources a campaign declares, else one CSV or Parquet file a test beside it."""
     if header.source:
         return header.source
-    kinds = [kind for kind in ("*.csv", "*.parquet") if next(folder.glob(kind), None)]
-    if not kinds:
+    beside = header.tables.given().values()
+    names = [sorted(p.name for p in folder.glob(kind) if p.name not in beside) for kind in ("*.csv", "*.parquet")]
+    found = [Source(files=glob.escape(name)) for kind in names for name in kind]
+    if not found:
         raise InputError(str(folder), "no CSV file of runs", "one CSV a test beside campaign.toml, or [[source]]")
-    return [Source(files=kind) for kind in kinds]
+    return found
 
 
 def _check_words(folder: Path, runs: pd.DataFrame, allowed: dict[str, list[str]]) -> None:

@@ -157,6 +157,32 @@ class Quality(Data):
     meaning: str
 
 
+class Tables(Data):
+    """Tables beside the runs that the quality checks look at.
+
+    Attributes
+    ----------
+    configurations : CSV with columns configuration and appendages: what each name of a
+        configuration in the source stands for.
+    reference : CSV with columns coefficient and value: derivatives of the same body printed
+        elsewhere, program frame, over 1/2 rho L^n.
+    """
+
+    configurations: str = ""
+    reference: str = ""
+
+    @field_validator("configurations", "reference")
+    @classmethod
+    def _beside(cls, name: str) -> str:
+        if name and (Path(name).name != name or len(name) > 200):
+            raise ValueError("the name of a file in the campaign folder")
+        return name
+
+    def given(self) -> dict[str, str]:
+        """Those that are named."""
+        return {k: v for k, v in self.model_dump().items() if v}
+
+
 class CampaignFile(Data):
     """Schema of ``campaign.toml``."""
 
@@ -173,6 +199,7 @@ class CampaignFile(Data):
     quality: dict[str, Quality]
     tare: list[Tare] = Field(default_factory=list)
     half_model: HalfModel | None = None
+    tables: Tables = Field(default_factory=Tables)
     source: list[Source] = Field(default_factory=list)
 
 

@@ -14,10 +14,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pandas as pd
 
-from ident import checks_copies, checks_physics, checks_runs, checks_tables
+from ident import checks_copies, checks_histories, checks_physics, checks_runs, checks_tables
 from ident.campaign import Campaign
 from ident.findings import SEVERITIES, Body, Evidence, Finding, registered, rules
 from ident.identify import Identification, identify
+from ident.readers import open_sheet
+from ident.readers.source import Source
+from ident.readers.table import run_cells
 from sim.errors import InputError
 
 if TYPE_CHECKING:
@@ -25,7 +28,7 @@ if TYPE_CHECKING:
     from rich.table import Table
 
 # Importing a module enters its checks in the registry.
-_MODULES = (checks_copies, checks_physics, checks_runs, checks_tables)
+_MODULES = (checks_copies, checks_histories, checks_physics, checks_runs, checks_tables)
 _COLOURS = {"error": "red", "warning": "yellow", "info": "cyan"}
 
 
@@ -35,21 +38,73 @@ def evidence_of(campaign: Campaign, folder: Path | None = None) -> Evidence:
     Parameters
     ----------
     campaign : From ``read_campaign``.
-    folder : Where it lies: channel descriptions beside the runs are read from ``*.txt``.
+    folder : Where it lies: channel descriptions beside the runs are read from ``*.txt``, and
+        the files of ``[tables]``.
+
+    Raises
+    ------
+    InputError
+        For a table of ``[tables]`` that is missing or lacks a column.
     """
     particulars, header = campaign.vehicle.particulars, campaign.header
     mass = particulars.displaced_mass.value
     x, y, z = (particulars.mass.value * k**2 for k in particulars.radius_of_gyration.value)
-    length = particulars.length.value
-    body = Body(length, header.fluid.density_kgpm3, mass, (x, y, z), None, f"vehicle {campaign.vehicle.name}")
+    length, scale = particulars.length.value, header.scale
+    draught = scale.ratio * scale.draught_m if scale.draught_m else None
+    body = Body(length, header.fluid.density_kgpm3, mass, (x, y, z), draught, f"vehicle {campaign.vehicle.name}")
+    beside = {k: read_table(folder, v, k) for k, v in header.tables.given().items()} if folder else {}
     return Evidence(
         runs=campaign.runs,
         body=body,
         vehicle=campaign.vehicle,
         campaign=campaign,
         labels=read_labels(folder) if folder else None,
-        tested_length=header.scale.ratio * header.scale.length_m,
+        histories=campaign.reduced,
+        configurations=beside.get("configurations"),
+        reference=beside.get("reference"),
+        tested_length=scale.ratio * scale.length_m,
     )
+
+
+# Columns of the files that [tables] names; the second of numbers or of text.
+_BESIDE = {"configurations": ("configuration", "appendages"), "reference": ("coefficient", "value")}
+
+
+def read_table(folder: Path, name: str, kind: str) -> pd.DataFrame:
+    """A table that ``[tables]`` of a campaign names.
+
+    Parameters
+    ----------
+    folder : The campaign's.
+    name : File in it.
+    kind : ``configurations`` or ``reference``.
+
+    Returns
+    -------
+    Its two columns, file and row.
+
+    Raises
+    ------
+    InputError
+        For a file that is missing, a column that is, or a value that is no number.
+    """
+    path = folder / name
+    if not path.is_file():
+        raise InputError(f"{folder / 'campaign.toml'}, key tables.{kind}", f"no file {name!r}", "a CSV file beside it")
+    sheet = open_sheet(path, Source(files=name, reader="table"))
+    for column in _BESIDE[kind]:
+        if column not in sheet.header:
+            text = f"columns {' and '.join(_BESIDE[kind])}"
+            raise InputError(sheet.where, f"no column {column!r}", text)
+    cells, rows = run_cells(sheet)
+    table = cells[list(_BESIDE[kind])].apply(lambda column: column.str.strip())
+    if kind == "reference":
+        numbers = [sheet.dialect.number(cell) for cell in table["value"]]
+        for row, cell, number in zip(rows, table["value"], numbers, strict=True):
+            if number is None:
+                raise InputError(f"{path}, row {row}, column value", repr(cell[:60]), "a finite number")
+        table["value"] = numbers
+    return table.assign(file=path.name, row=rows)
 
 
 def read_labels(folder: Path) -> pd.DataFrame | None:
@@ -89,15 +144,17 @@ def check_campaign(campaign: Campaign, folder: Path | None = None) -> list[Findi
     Constant coefficients are identified for it and checked as a table of derivatives.
     """
     evidence = evidence_of(campaign, folder)
-    if campaign.vehicle.term_set == "gertler_hagen":
+    if campaign.vehicle.term_set != "reduced":
         evidence = replace(evidence, derivatives=constants(identify(campaign)))
     return run(evidence)
 
 
 def constants(found: Identification) -> pd.DataFrame:
-    """The coefficients without an axis, as a table of derivatives: coefficient, value, file, row."""
-    own = [(n.name, v) for n, v in zip(found.nodes, found.values, strict=True) if not n.point and n.part == "hull"]
-    table = pd.DataFrame(own, columns=["coefficient", "value"])
+    """The coefficients without an axis, as a table of derivatives: coefficient, value, stderr, file, row."""
+    errors = np.sqrt(np.diag(found.covariance))
+    every = zip(found.nodes, found.values, errors, strict=True)
+    own = [(n.name, v, e) for n, v, e in every if not n.point and n.part == "hull"]
+    table = pd.DataFrame(own, columns=["coefficient", "value", "stderr"])
     return table.assign(file="identified coefficients", row=table.index + 1)
 
 

@@ -62,6 +62,16 @@ def mirror_image(runs: pd.DataFrame, vehicle: Vehicle | None) -> pd.DataFrame:
     return image
 
 
+def mirror_known(runs: pd.DataFrame, vehicle: Vehicle | None) -> pd.Series:
+    """True where the mirror image of a run's state is known.
+
+    A deflection that stands beside another part than a plane may be that of a rudder, which
+    the mirror reverses, or of an elevator, which it does not.
+    """
+    planes = [p.name for p in vehicle.planes] if vehicle else []
+    return (runs["plane"].fillna(0.0) == 0.0) | runs["part"].isin(planes)
+
+
 def state_key(runs: pd.DataFrame) -> pd.Series:
     """A state and its part as a number: equal states have equal keys; a missing motion is zero."""
     table = pd.DataFrame(_rounded(runs[list(STATE)].to_numpy(float)), columns=list(STATE), index=runs.index)

@@ -145,7 +145,8 @@ def drift_or_rudder(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
     for test, (angle, force, moment, sense) in _IN_PLANE.items():
         runs = evidence.runs[(evidence.runs["test"] == test) & evidence.runs["part"].isin(["hull", ""])]
         for file, group in runs.groupby("file", sort=False):
-            lever = sense * _slope(group, angle, moment, body) / _slope(group, angle, force, body)
+            lift = _slope(group, angle, force, body)
+            lever = sense * _slope(group, angle, moment, body) / lift if lift else math.nan
             if rule.limits["stern"] < lever < rule.limits["aft"]:
                 what = f"{force} over {angle} acts at x = {lever:.2f} L, where a stern plane is: "
                 what += f"is {angle} the plane angle?"

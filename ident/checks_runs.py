@@ -10,9 +10,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from ident.checks_copies import mirror_image, state_key
+from ident.checks_copies import mirror_image, mirror_known, state_key
 from ident.findings import (
-    STATE,
     Array,
     Evidence,
     Finding,
@@ -26,7 +25,7 @@ from ident.findings import (
     prime,
     rules,
 )
-from sim.catalogue import MIRROR_OUTPUT, MIRRORED_FACTORS, OUTPUTS
+from sim.catalogue import MIRROR_OUTPUT, OUTPUTS
 
 # Axes along which a load is smooth; angles and rates also bend (stall), and do so in
 # every series alike.
@@ -46,7 +45,7 @@ def pairs(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
     """A run and its port/starboard image, loads of both measured."""
     if evidence.body is None:
         return
-    runs = evidence.runs[evidence.runs["copy_of"] == ""]
+    runs = evidence.runs[(evidence.runs["copy_of"] == "") & mirror_known(evidence.runs, evidence.vehicle)]
     image = mirror_image(runs, evidence.vehicle)
     there = zip(image["test"], state_key(image), strict=True)
     at = {place: k for k, place in enumerate(zip(runs["test"], state_key(runs), strict=True))}
@@ -97,12 +96,10 @@ def zero_by_symmetry(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
     if evidence.body is None:
         return
     runs = evidence.runs
-    planes = {p.name: p for p in evidence.vehicle.planes} if evidence.vehicle else {}
-    paired = [n for n, p in planes.items() if p.mirror != n]
-    # Without a vehicle the deflected plane may be a rudder, which makes a side force.
-    turned = [c for c in STATE if c == "beta" or c in MIRRORED_FACTORS]
-    turned += ["plane"] if evidence.vehicle is None else []
-    straight = (runs[turned].fillna(0.0) == 0.0).all(axis=1) & ~runs["part"].isin(paired)
+    # A state is symmetric when its mirror image is the same state: no drift, roll or yaw, and no
+    # rudder, one plane of a pair, or deflection of unknown sense at an angle.
+    same = state_key(mirror_image(runs, evidence.vehicle)) == state_key(runs)
+    straight = same & mirror_known(runs, evidence.vehicle)
     for output in _ODD:
         load = prime(runs, output, evidence.body).abs().where(kept(runs, output))
         largest = load.groupby([runs["file"], runs["test"]]).transform("max")
@@ -170,10 +167,11 @@ def _series(evidence: Evidence) -> list[Series]:
     runs = runs[runs["decoupled"] != "True"] if "decoupled" in runs else runs
     for output in OUTPUTS:
         runs = runs.assign(**{output: runs[output].where(kept(runs, output))})
-    image = mirror_image(runs, evidence.vehicle)
+    known = mirror_known(runs, evidence.vehicle)
+    image = mirror_image(runs[known], evidence.vehicle)
     table = pd.concat([runs, image], ignore_index=True)
-    owner = np.concatenate([runs.index, runs.index])
-    scale = np.concatenate([dynamic(runs, evidence.body)] * 2)
+    owner = np.concatenate([runs.index, image.index])
+    scale = dynamic(table, evidence.body).to_numpy(float)
     loads = table[list(OUTPUTS)].to_numpy(float) / scale[:, None]
     loads[:, 3:] /= evidence.body.length
     first = ~pd.DataFrame({"owner": owner, "state": state_key(table)}).duplicated().to_numpy()

@@ -1,4 +1,4 @@
-"""Checks of what stands beside the runs: derivatives, descriptions, names, times, tests."""
+"""Checks of what stands beside the runs: derivatives, descriptions, names, tests."""
 
 from __future__ import annotations
 
@@ -9,12 +9,11 @@ from collections.abc import Iterator
 from functools import cache
 from importlib.resources import files
 
-import numpy as np
 import pandas as pd
 
-from ident.checks_copies import digits
-from ident.findings import DIRECT, Array, Evidence, Finding, Rule, check, rules
+from ident.findings import DIRECT, Evidence, Finding, Rule, check, rules
 from ident.nodes import vanishes
+from ident.published import TEST as PUBLISHED
 from sim.catalogue import OUTPUTS
 from sim.parts import parts_of, vehicle_terms
 
@@ -39,6 +38,14 @@ def _values(table: pd.DataFrame) -> dict[str, tuple[float, str, int]]:
             file = str(table["file"].iloc[i]) if "file" in table else ""
             found[symbol(str(name))] = (float(value), file, int(table["row"].iloc[i]) if "row" in table else i + 2)
     return found
+
+
+def _relative_errors(table: pd.DataFrame, *names: str) -> list[float]:
+    """Standard errors over values, where the table has a column ``stderr``; else zero."""
+    if "stderr" not in table:
+        return [0.0]
+    own = table[[symbol(str(n)) in names for n in table["coefficient"]]]
+    return [abs(e / v) for v, e in zip(own["value"], own["stderr"], strict=True) if v]
 
 
 def vertical_partner(name: str) -> tuple[str, int] | None:
@@ -88,6 +95,9 @@ def body_of_revolution(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
     sway, heave = (known.get(k, (math.nan,))[0] for k in ("Yvdot", "Zwdot"))
     if not abs(sway - heave) <= rule.limits["same"] * abs(heave):
         return
+    # Equal values whose errors are larger than the differences looked for say nothing of the body.
+    if max(_relative_errors(evidence.derivatives, "Yvdot", "Zwdot")) > rule.limits["differs"]:
+        return
     for name, (value, file, row) in known.items():
         partner = vertical_partner(name)
         if partner is None or partner[0] not in known or known[partner[0]][0] == 0.0:
@@ -109,6 +119,8 @@ def length_over_draught(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
     known, step = _values(evidence.derivatives), body.length / body.draught
     other = _values(evidence.reference) if evidence.reference is not None else {}
     ratios = {n: abs(v / other[n][0]) for n, (v, _, _) in known.items() if other.get(n, (0.0,))[0] and v}
+    # A ratio that leaves the floating-point range is no factor L/d.
+    ratios = {n: r for n, r in ratios.items() if 0.0 < r < math.inf}
     for claim, factor in (("1/2 rho L d, not 1/2 rho L^2", step), ("1/2 rho L^2, not 1/2 rho L d", 1.0 / step)):
         near = {n: r for n, r in ratios.items() if abs(math.log(r / factor)) < math.log1p(rule.limits["share"])}
         if near and len(near) > len(ratios) / 2:
@@ -177,45 +189,9 @@ def configurations(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
             yield rule.finding("campaign.toml", [], [], f"{text!r} names a configuration by a number")
 
 
-@check("time")
-def clocks(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
-    """Every time column of the evidence."""
-    for name, time in evidence.times.items():
-        yield from time_stamps(np.asarray(time, dtype=float), name, rule)
-
-
-def time_stamps(time: Array, file: str, rule: Rule | None = None, first_row: int = 2) -> Iterator[Finding]:
-    """Stamps that are not finite, repeat or step back.
-
-    Parameters
-    ----------
-    time : Stamps in the order of the file [s].
-    file, first_row : File, and its row of the first stamp.
-    rule : The row of ``data/checks.csv``; looked up when None.
-    """
-    rule = rule or rules()["time"]
-    time = np.asarray(time, dtype=float)
-    bad = np.flatnonzero(~np.isfinite(time))
-    if bad.size:
-        yield rule.finding(file, bad + first_row, ["time"], f"{bad.size} time stamps are not finite numbers")
-    step = np.diff(time)
-    back = np.flatnonzero(step < 0.0) + 1
-    if back.size:
-        k = int(back[0])
-        text = f"time steps back {back.size} times, first from {time[k - 1]:g} s to {time[k]:g} s"
-        yield rule.finding(file, back + first_row, ["time"], text)
-    same = np.flatnonzero(step == 0.0) + 1
-    if same.size:
-        shown = int(digits(time[np.isfinite(time)]).max())
-        text = f"{same.size} time stamps repeat the one before, from {time[same[0]]:g} s on"
-        few = shown <= rule.limits["digits"]
-        text += f": the column is printed with {shown} significant digits" if few else ""
-        yield rule.finding(file, same + first_row, ["time"], text)
-
-
 @check("missing")
 def unsupported_terms(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
-    """Terms of the vehicle's set without a run, or with copies of other runs only."""
+    """Terms of the vehicle's set without a run or published value, or with copies of other runs only."""
     campaign = evidence.campaign
     if campaign is None:
         return
@@ -225,6 +201,10 @@ def unsupported_terms(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
     seen, own = set(), set()
     for _, run in campaign.runs.iterrows():
         features = solver.features(run)
+        if run["test"] == PUBLISHED:
+            term = solver.by_name[run["coefficient"]]
+            own.add(solver.canonical(term.name, run["part"], solver.place(term, features))[0][:2])
+            continue
         given = [o for o in (*OUTPUTS, *DIRECT) if pd.notna(run[o]) and o not in run["exclude"].split()]
         names = {(o, "propeller") for o in given if o in DIRECT}
         for output in given:
@@ -242,7 +222,7 @@ def unsupported_terms(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
         if term.name != "w_T" and not idle and not keys & own:
             (copied if keys & seen else absent).setdefault(" or ".join(term.tests), []).append(term.name)
     for groups, text, severity in (
-        (absent, "no run identifies", rule.severity),
+        (absent, "no run or published value gives", rule.severity),
         (copied, "only copies or mappings of other runs give", "info"),
     ):
         for test, symbols in groups.items():

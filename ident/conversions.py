@@ -108,7 +108,8 @@ def turn(runs: pd.DataFrame, frame: Frame, angles: str) -> pd.DataFrame:
     return turned
 
 
-def _applies(runs: pd.DataFrame, tare: Tare) -> pd.Series:
+def tare_applies(runs: pd.DataFrame, tare: Tare) -> pd.Series:
+    """Which runs a tare is taken off: (runs,) of bool."""
     chosen = pd.Series(True, index=runs.index)
     if tare.tests:
         chosen &= runs["test"].isin(tare.tests)
@@ -127,7 +128,7 @@ def without_tare(runs: pd.DataFrame, tares: list[Tare], where: str) -> pd.DataFr
     """
     out = runs.copy()
     for k, tare in enumerate(tares):
-        chosen = _applies(runs, tare)
+        chosen = tare_applies(runs, tare)
         place = f"{where}, key tare.{k}"
         for output, text in tare.loads.items():
             out.loc[chosen, output] = out.loc[chosen, output] - quantity_of(text, output, f"{place}.loads.{output}")
@@ -287,6 +288,8 @@ def standard_errors(runs: pd.DataFrame, header: CampaignFile, length: float) -> 
         if f"size_{name}" in out:
             size = size.where(out[f"size_{name}"].isna(), out[f"size_{name}"])
         prime = (size / dynamic).where(dynamic > 0) if name in OUTPUTS else size
+        # An excluded load is no measure of what the others can be read to.
+        prime = prime.where(~out["exclude"].map(lambda text, name=name: name in text.split()).astype(bool))
         worst = prime.groupby([out["test"], out["part"], kind]).transform("max").fillna(0.0)
         floor = header.uncertainty.floor * worst * (dynamic if name in OUTPUTS else 1.0)
         ruled = quality * out["rel_sigma"] * np.maximum(size, floor)

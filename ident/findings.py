@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from functools import cache
 from importlib.resources import files
 from typing import TYPE_CHECKING, Any
@@ -17,6 +17,7 @@ from sim.catalogue import ACCELERATIONS, OUTPUTS
 
 if TYPE_CHECKING:
     from ident.campaign import Campaign
+    from ident.histories import Reduced
     from sim.vehicle import Vehicle
 
 Array = NDArray[np.float64]
@@ -52,6 +53,10 @@ class Finding:
     def as_json(self) -> dict[str, Any]:
         """The finding for a program to read."""
         return asdict(self) | {"rows": list(self.rows), "columns": list(self.columns)}
+
+    def with_words(self, more: str) -> Finding:
+        """The same finding with words added to what was found."""
+        return replace(self, what=self.what + more)
 
     @property
     def shown_rows(self) -> str:
@@ -148,6 +153,7 @@ class Evidence:
     labels : Columns sheet, column, description, file, row.
     configurations : Columns configuration, appendages, file, row.
     times : File or column name -> time stamps [s].
+    histories : Reduced time histories, with their clocks and verdicts.
     tested_length : Length of the body the loads were measured on, at the body's scale [m].
     memo : What two checks share, by name.
     """
@@ -161,6 +167,7 @@ class Evidence:
     labels: pd.DataFrame | None = None
     configurations: pd.DataFrame | None = None
     times: Mapping[str, Array] = field(default_factory=dict)
+    histories: tuple[Reduced, ...] = ()
     tested_length: float | None = None
     memo: dict[str, pd.DataFrame] = field(default_factory=dict, repr=False)
 

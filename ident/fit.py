@@ -14,6 +14,7 @@ from ident.checks import table as findings_table
 from ident.findings import Finding
 from ident.identify import Identification, identify
 from ident.notes import group_unused, group_warnings
+from ident.provenance import conversions
 from ident.store import commit, database_rows, digest
 from sim.errors import InputError
 
@@ -55,6 +56,7 @@ class Fit:
             "new": self.new,
             "digest": self.digest,
             "runs": len(self.campaign.runs),
+            "conversions": conversions(self.campaign),
             "coefficients": coefficient_table(self.rows),
             "unused": [dict(zip(_UNUSED, u, strict=True)) for u in self.found.unused],
             "warnings": [{"subject": s, "message": m} for s, m in self.found.warnings],
@@ -63,7 +65,7 @@ class Fit:
 
 
 def metadata(campaign: Campaign, found: Identification, message: str, findings: list[Finding]) -> dict[str, str]:
-    """What a commit carries beside its rows: provenance, inputs, notes of the fit."""
+    """What a commit carries beside its rows: provenance, inputs, conversions, notes of the fit."""
     header = campaign.header
     return {
         "campaign": header.name,
@@ -71,6 +73,7 @@ def metadata(campaign: Campaign, found: Identification, message: str, findings: 
         "provenance": header.provenance.strip(),
         "frame": f"x {header.frame.x}, y {header.frame.y}, z {header.frame.z}",
         "inputs": json.dumps(campaign.digests),
+        "conversions": json.dumps(conversions(campaign)),
         "options": json.dumps({"uncertainty": header.uncertainty.model_dump()}),
         "unused": json.dumps(found.unused),
         "warnings": json.dumps(found.warnings),

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ident import condense, reduction
+from ident.clock import Clock
 from ident.quantities import HARMONICS
 from ident.readers.source import MOTIONS, Reduction
 from sim.catalogue import OUTPUTS
@@ -24,9 +25,9 @@ Pieces = Callable[[], Iterator[Array]]
 
 # The four states of an oscillation: name, phase of the displacement A sin(theta).
 PHASES = {"+v": 0.0, "-v": math.pi, "+a": math.pi / 2, "-a": 3 * math.pi / 2}
-# Test whose terms a state at the end of the velocity identifies.
 # Amplitudes of rate and acceleration in a table are printed with three digits or more.
 _AGREE = 0.02
+# Test whose terms a state at the end of the velocity identifies.
 _STEADY_TEST = {"surge": "towing", "sway": "drift_horizontal", "heave": "drift_vertical"}
 
 
@@ -39,11 +40,13 @@ class Channels:
     path : File or folder they come from.
     quantities : ``time`` (unless a rate is stated), loads, and measured states.
     pieces : Starts reading; blocks (rows, channels) in SI.
+    first_row : File row of the first sample.
     """
 
     path: Path
     quantities: list[str]
     pieces: Pieces
+    first_row: int = 2
 
 
 @dataclass(frozen=True)
@@ -56,6 +59,9 @@ class Reduced:
     loads : Names of the channels that were fitted.
     kind : Kind of reduction.
     fit : Values, covariance, window, verdict.
+    clock : Its time stamps; None where the file has none.
+    rate_hz : Sampling rate that stands in for them.
+    first_row : File row of the first stamp.
     """
 
     run_id: str
@@ -63,6 +69,14 @@ class Reduced:
     loads: list[str]
     kind: str
     fit: reduction.Fitted
+    clock: Clock | None = None
+    rate_hz: float | None = None
+    first_row: int = 2
+
+    @property
+    def runs(self) -> list[str]:
+        """Names of the runs it became."""
+        return [self.run_id + phase for phase in PHASES] if self.kind == "oscillatory" else [self.run_id]
 
     def words(self) -> str:
         """The reduction in one line, as the run table carries it."""
@@ -74,12 +88,14 @@ class Reduced:
         )
 
 
-def _timed(channels: Channels, rule: Reduction) -> Iterator[tuple[Array, Array]]:
-    """Pieces as (time, other channels) within the window, time rising."""
+def _timed(channels: Channels, rule: Reduction, clock: Clock | None = None) -> Iterator[tuple[Array, Array]]:
+    """Pieces as (time, other channels) within the window, time rising; stamps are fed to ``clock``."""
     at = channels.quantities.index("time") if "time" in channels.quantities else None
     others = [i for i, q in enumerate(channels.quantities) if q != "time"]
     count, last = 0, -math.inf
     for piece in channels.pieces():
+        if clock is not None and at is not None:
+            clock.feed(piece[:, at])
         if rule.rate_hz is not None:
             time = (count + np.arange(len(piece))) / rule.rate_hz
         else:
@@ -89,7 +105,8 @@ def _timed(channels: Channels, rule: Reduction) -> Iterator[tuple[Array, Array]]
             i = int(np.flatnonzero(step <= 0.0)[0])
             place = f"{channels.path}, data row {count + i + 1}, column time"
             text = "a time that rises; or rate_hz in [source.reduction] where stamps have too few digits"
-            raise InputError(place, f"{time[i]:g} s after {time[i - 1] if i else last:g} s", text)
+            found = f"{time[i]:g} s after {time[i - 1] if i else last:g} s{_in_all(channels, at)}"
+            raise InputError(place, found, text)
         count, last = count + len(piece), float(time[-1])
         keep = np.ones(len(time), dtype=bool)
         if rule.start_s is not None:
@@ -98,6 +115,15 @@ def _timed(channels: Channels, rule: Reduction) -> Iterator[tuple[Array, Array]]
             keep &= time <= rule.end_s
         if keep.any():
             yield time[keep], piece[keep][:, others]
+
+
+def _in_all(channels: Channels, at: int | None) -> str:
+    """How many stamps of a file do not rise, where it is more than one."""
+    clock = Clock()
+    for piece in channels.pieces() if at is not None else ():
+        clock.feed(piece[:, at])
+    count = clock.repeats + clock.backs
+    return f"; {count} of {clock.samples} stamps repeat or step back" if count > 1 else ""
 
 
 def reduce(channels: Channels, rule: Reduction, run_id: str, frequency: float | None) -> tuple[dict[str, Any], Reduced]:
@@ -129,14 +155,16 @@ def reduce(channels: Channels, rule: Reduction, run_id: str, frequency: float | 
         text = "a column time, or rate_hz in [source.reduction]"
         raise InputError(str(channels.path), "no time", text)
     regressors, span = _regressors(channels, rule, frequency)
-    condensed = condense.condense(_timed(channels, rule), regressors, len(names))
+    clock = Clock() if "time" in channels.quantities else None
+    condensed = condense.condense(_timed(channels, rule, clock), regressors, len(names))
     try:
         fit = reduction.fit_history(condensed, names)
     except (ValueError, np.linalg.LinAlgError) as error:
         window = f" between start_s and end_s ({rule.start_s}, {rule.end_s})" if rule.start_s or rule.end_s else ""
         text = f"samples enough for a {rule.kind} fit{window}"
         raise InputError(str(channels.path), f"{error} in {condensed.samples} rows", text) from error
-    reduced = Reduced(run_id, channels.path.name, names, rule.kind, fit)
+    own = (clock, rule.rate_hz, channels.first_row)
+    reduced = Reduced(run_id, channels.path.name, names, rule.kind, fit, *own)
     if rule.kind == "oscillatory":
         return _harmonic_values(names, fit, frequency or 0.0), reduced
     values: dict[str, Any] = {}

@@ -17,6 +17,7 @@ import pandas as pd
 from ident.derivatives import checks, derivatives
 from ident.findings import spans
 from ident.notes import group_unused, group_warnings
+from ident.provenance import steps
 from ident.report_figures import draw_figures, equations, quality_colours
 from sim import catalogue
 from sim.catalogue import RULES, Term
@@ -200,6 +201,7 @@ def _content(db: str, number: int, vehicle: Vehicle, rows: pd.DataFrame) -> dict
         "version": number,
         "frame": str(PROGRAM),
         "provenance": [(k, v) for k, v in _provenance(db, number, commit, vehicle) if v],
+        "steps": steps(_stored(commit.metadata, "conversions", {})),
         "inputs": _stored(commit.metadata, "inputs", {}),
         "coverage": {g: [c for c in coverage if c["group"] == g] for g in dict.fromkeys(c["group"] for c in coverage)},
         "present": [c for c in coverage if not c["absent"]],

@@ -11,18 +11,22 @@ import numpy as np
 import pandas as pd
 
 from ident.campaign_file import CampaignFile
-from ident.conversions import dimensional, quantity_of
+from ident.conversions import DIRECT, MOTION, dimensional, quantity_of
 from ident.histories import Channels, Pieces, Reduced, reduce, states
 from ident.quantities import Column, column, owner, suffixed
 from ident.readers import matching, open_sheet, openfoam, reader_of
 from ident.readers.source import Source
 from ident.readers.table import Sheet, columns_of, run_cells
 from ident.readers.text import LARGEST, Dialect
+from sim.catalogue import OUTPUTS
 from sim.errors import InputError
 
 TEXT = ("run_id", "test", "part", "quality", "source", "copy_of", "exclude", "reason", "decoupled", "coefficient")
 REQUIRED = ("run_id", "test", "part", "quality", "source")
 _PLAIN = Dialect()
+# What [source.within] can limit, and by how much of itself a limit is widened.
+_STATES = ("U", "alpha", "beta", "D0", "plane", "n", "J", *MOTION)
+_SLACK = 1e-9
 
 
 def source_runs(folder: Path, source: Source, header: CampaignFile) -> tuple[pd.DataFrame, list[Reduced], list[Path]]:
@@ -56,8 +60,48 @@ def source_runs(folder: Path, source: Source, header: CampaignFile) -> tuple[pd.
             reduced += found
         else:
             table = _from_table(path, source, header, stated, where)
-        tables.append(table)
+        tables.append(outside_excluded(table, source, where))
     return pd.concat(tables, ignore_index=True), reduced, paths
+
+
+def outside_excluded(table: pd.DataFrame, source: Source, where: str) -> pd.DataFrame:
+    """Runs with every load excluded where their state is outside ``[source.within]``.
+
+    Parameters
+    ----------
+    table : Runs in SI, in the campaign's own frame.
+    source : Its ``within``: state with a suffix unit -> lowest and highest value.
+    where : The campaign file.
+
+    Returns
+    -------
+    ``table`` with ``exclude`` and ``reason`` filled in for these runs, so that fit and checks
+    leave them out and say why.
+
+    Raises
+    ------
+    InputError
+        For a state that is not one, has no unit, or that no run of the files gives.
+    """
+    out = table
+    for name, (low, high) in source.within.items():
+        place = f"{where}, key source.within.{name}"
+        if name not in suffixed() or suffixed()[name][0] not in _STATES:
+            known = ", ".join(c for c, (q, _) in suffixed().items() if q in ("U", "alpha", "beta", "r"))
+            raise InputError(place, "no state of a run with its unit", known + " and the like")
+        quantity, factor = suffixed()[name]
+        if quantity not in out or out[quantity].isna().all():
+            raise InputError(place, f"no {quantity} in the runs of {source.files}", "a state that the runs give")
+        value = out[quantity].astype(float)
+        # A limit that stands in the file in other digits is still inside.
+        slack = _SLACK * max(abs(low), abs(high)) * factor
+        outside = (value < low * factor - slack) | (value > high * factor + slack)
+        loads = " ".join(o for o in (*OUTPUTS, *DIRECT) if o in out)
+        out = out.assign(
+            exclude=out["exclude"].mask(outside, loads),
+            reason=out["reason"].mask(outside, f"{name} beyond {low:g} to {high:g}"),
+        )
+    return out
 
 
 def constants(folder: Path, path: Path, source: Source) -> tuple[dict[str, str], dict[str, float], set[str]]:
@@ -230,7 +274,7 @@ def _channels(
         for block in sheet.numbers([i for i, _ in wanted]):
             yield block * factors
 
-    yield "", Channels(path, names, pieces)
+    yield "", Channels(path, names, pieces, sheet.first_row)
 
 
 def _openfoam(path: Path, source: Source, header: CampaignFile, where: str) -> Iterator[tuple[str, Channels]]:

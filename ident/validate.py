@@ -137,10 +137,10 @@ def flights(case: Case, boat: Boat) -> tuple[Simulation, dict[str, Simulation]]:
     sim.trim.NoEquilibrium
         When the case starts from self-propulsion and there is none.
     """
-    model = boat.model(case)
+    model, water = boat.model(case), boat.water(case)
     started = {s: case.started_as(s) for s in (case.reference.compare if case.reference else [])}
-    own = {s: fly(c, boat.vehicle, model) for s, c in started.items() if c is not None}
-    return fly(case, boat.vehicle, model), own
+    own = {s: fly(c, boat.vehicle, model, water) for s, c in started.items() if c is not None}
+    return fly(case, boat.vehicle, model, water), own
 
 
 def errors(case: Case, reference: Series, simulation: Simulation, own: dict[str, Simulation]) -> dict[str, Any]:

@@ -1,7 +1,7 @@
 """Speed of the wave loads beside a calm-water step, in one run: ``python -m sim.bench_waves``.
 
-A step in waves is what the calm step does, plus the sums of the waves when they are due and
-one interpolation for each of the four right-hand sides.
+A step in waves is the whole one of the simulation: sums of the waves when they are due, and
+wave loads, relative motion and emergence in each of the four right-hand sides.
 """
 
 from __future__ import annotations
@@ -20,12 +20,13 @@ from sim.case import load_case
 from sim.coefficients import Coefficients
 from sim.database import read_rows
 from sim.errors import InputError
-from sim.in_waves import sea_around, volume_points
+from sim.in_waves import surroundings, volume_points, water_around
 from sim.model import Environment, assemble
 from sim.pressure import froude_krylov, reference_load
 from sim.simulate import simulate
 from sim.spectra import Spectrum, realise, sea_state
 from sim.surface import read_geometry
+from sim.surroundings import prepare
 from sim.vehicle import load_vehicle
 from sim.waves import regular
 
@@ -37,12 +38,9 @@ def _calm_steps(m, states, controls, rate, step, work, stages, out):
 
 
 @njit(cache=True)
-def _wave_steps(m, states, controls, rate, step, work, stages, out, sea, sums, found):
+def _wave_steps(m, states, controls, rate, step, work, stages, out):
     for i in range(states.shape[0]):
-        now = i * step
-        wave_loads.advance(sea, states[i], now, sums)
-        for stage in range(4):
-            wave_loads.at(sums, now + 0.5 * step * ((stage + 1) // 2), found)
+        prepare(work.around, states[i], i * step)
         kernel.rk4(m, states[i], controls[i], rate, step, work, stages, out)
 
 
@@ -58,9 +56,9 @@ def _evaluations(sea, states, sums, value, slope):
         wave_loads.evaluate(sea, states[i], 0.1 * i, sums, value, slope)
 
 
-def _voyage(model, states, controls, rate, step, work, stages, out, sea):
-    sums = wave_loads.passage(sea)
-    _wave_steps(model, states, controls, rate, step, work, stages, out, sea, sums, np.zeros(sums.value.shape[1]))
+def _voyage(model, states, controls, rate, step, stages, out, water):
+    work = kernel.workspace(len(model.planes), surroundings(water, model))
+    _wave_steps(model, states, controls, rate, step, work, stages, out)
 
 
 def _alternately(calls: list[Callable[[], object]], tries: int) -> list[float]:
@@ -108,7 +106,7 @@ def main(db: str, name: str, components: int, step: float, depth: float, tries: 
     density, gravity = environment.density, environment.gravity
     one = regular(state.height, gravity * state.period**2 / (2.0 * np.pi), np.pi, density, gravity)
     many = realise(Spectrum("bretschneider", state.height, state.period, np.pi, 5.0), components, 1, density, gravity)
-    seas = [sea_around(coefficients, environment, waves) for waves in (one, many)]
+    waters = [water_around(coefficients, environment, waves) for waves in (one, many)]
     volume = volume_points(vehicle, environment)
     click.echo(f"{vehicle.name}, database version {version}, one core")
     assert vehicle.geometry is not None
@@ -121,12 +119,12 @@ def main(db: str, name: str, components: int, step: float, depth: float, tries: 
     click.echo(f"pressure load, {len(volume.volumes)} volume points, 1 component {1e6 * fast:8.2f} us")
     few = states[:: max(1, n // 500)]
     steps: list[Callable[[], object]] = [lambda: _calm_steps(model, states, controls, rate, step, work, stages, out)]
-    for sea, count in zip(seas, (1, components), strict=True):
-        sums = wave_loads.passage(sea)
+    for water, count in zip(waters, (1, components), strict=True):
+        sea, sums = water.sea, wave_loads.passage(water.sea)
         value, slope = np.zeros(sums.value.shape[1]), np.zeros(sums.value.shape[1])
         whole = _best(partial(_evaluations, sea, few, sums, value, slope), len(few), tries)
         click.echo(f"every wave quantity with rates, {count:3d} components {1e6 * whole:8.2f} us")
-        steps.append(partial(_voyage, model, states, controls, rate, step, work, stages, out, sea))
+        steps.append(partial(_voyage, model, states, controls, rate, step, stages, out, water))
     calm, single, seaway = (t / n for t in _alternately(steps, tries))
     click.echo(f"{n} states along {case.name} from D0 = {depth} m, step {step} s")
     click.echo(f"RK4 step, calm                              {1e6 * calm:8.2f} us")

@@ -33,6 +33,8 @@ Maneuver = Literal[
     "course_keeping",
     "rise",
     "self_propulsion",
+    "regular_waves",
+    "irregular_waves",
 ]
 
 # A record of more steps than this does not fit a laptop's memory.
@@ -40,10 +42,56 @@ _MOST_STEPS = 1e7
 
 
 class EnvironmentData(Data):
-    """Water density and gravity."""
+    """Water density and gravity.
+
+    ``free_surface``: the hull may come out of the water and loses buoyancy and added mass
+    there; always so in waves, which need the vehicle's geometry alike.
+    """
 
     density_kgpm3: Positive
     gravity_mps2: Positive
+    free_surface: bool = False
+
+
+class WavesData(Data):
+    """Waves of a case.
+
+    A regular wave has ``height_m`` from crest to trough and ``length_m`` or ``period_s``; a
+    spectrum has ``sea_state`` (``sim/data/sea_states.csv``) or its significant ``height_m`` and
+    peak ``period_s``. ``direction_deg``: where the waves travel to, clockwise from north; a
+    case starts along north, so 180 is a head sea. ``phase_deg`` of a regular wave: zero puts a
+    crest at the earth origin at the start. ``spreading``: s of cos^2s of half the angle; zero
+    is long-crested.
+    """
+
+    kind: Literal["regular", "bretschneider", "jonswap"]
+    direction_deg: float
+    sea_state: int | None = None
+    height_m: Annotated[float, Field(ge=0)] | None = None
+    length_m: Positive | None = None
+    period_s: Positive | None = None
+    phase_deg: float = 0.0
+    components: Annotated[int, Field(ge=1, le=5000)] = 200
+    seed: Annotated[int, Field(ge=0)] = 1
+    spreading: Annotated[float, Field(ge=0)] = 0.0
+    gamma: Annotated[float, Field(ge=1)] = 3.3
+
+    @model_validator(mode="after")
+    def _one_size(self) -> WavesData:
+        if self.kind == "regular":
+            if self.sea_state is not None:
+                raise ValueError("a regular wave has height_m, and length_m or period_s; no sea_state")
+            if self.height_m is None or (self.length_m is None) == (self.period_s is None):
+                raise ValueError("a regular wave needs height_m, and one of length_m and period_s")
+            return self
+        if self.length_m is not None:
+            raise ValueError("a spectrum has a peak period_s, no length_m")
+        if self.phase_deg:
+            raise ValueError("phase_deg is for a regular wave; the phases of a spectrum come from its seed")
+        given = (self.height_m is not None, self.period_s is not None)
+        if given != ((False, False) if self.sea_state is not None else (True, True)):
+            raise ValueError("a spectrum needs sea_state, or height_m and period_s")
+        return self
 
 
 class Initial(Data):
@@ -156,6 +204,7 @@ class Case(Data):
     maneuver: Maneuver | None = None
     sail_planes: bool = True
     environment: EnvironmentData
+    waves: WavesData | None = None
     initial: Initial
     run: Run
     command: Commands

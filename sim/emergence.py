@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 
 from sim.mesh import Mesh
 from sim.pressure import fill_rotation
-from sim.waves import Waves
 
 Array = NDArray[np.float64]
 _SIDES = (1.0, -1.0)
@@ -31,6 +30,7 @@ class Cells(NamedTuple):
     points : (n, 3) centroids; boxes, halves : (n, 3) middle and half extents of the box that
         stands for each, body frame [m].
     volumes : (n,) [m^3]. station : (n,) of the cell; stations : (s,) their x [m].
+    section : (n,) nearest of the sections that carry added mass; zeros where none were given.
     low, high : (3,) corners of the box that holds them [m].
     """
 
@@ -40,6 +40,7 @@ class Cells(NamedTuple):
     volumes: Array
     station: NDArray[np.int64]
     stations: Array
+    section: NDArray[np.int64]
     low: Array
     high: Array
 
@@ -105,6 +106,7 @@ def cells(
     bands: int = 8,
     displaced: float | None = None,
     centre: Sequence[float] | None = None,
+    sections: Array | None = None,
 ) -> Cells:
     """Cells of every part of a mesh; parts shorter than a station's length get one station.
 
@@ -114,6 +116,7 @@ def cells(
     stations, bands : Cells along x over the boat's length, and along z over each part's height.
     displaced : Volume [m^3] to scale to, when the mesh's own is not the vehicle's.
     centre : Centre of buoyancy to shift to [m], likewise: fully emerged, nothing is left over.
+    sections : (k, 3) centres of the sections that carry added mass [m].
     """
     x = mesh.vertices[mesh.triangles.ravel(), 0]
     length = (x.max() - x.min()) / stations
@@ -126,30 +129,15 @@ def cells(
         place, box = place + shift, box + shift
     middles = x.min() + length * (np.arange(stations) + 0.5)
     station = np.abs(box[:, :1] - middles).argmin(axis=1)
-    return Cells(place, box, half, volume, station, middles, (box - half).min(axis=0), (box + half).max(axis=0))
+    near = np.zeros((1, 3)) if sections is None or len(sections) == 0 else sections
+    section = np.linalg.norm(place[:, None] - near[None], axis=2).argmin(axis=1)
+    return Cells(
+        place, box, half, volume, station, middles, section, (box - half).min(axis=0), (box + half).max(axis=0)
+    )
 
 
 @njit(cache=True, error_model="numpy")
-def elevations(w: Waves, c: Cells, y: Array, time: float, out: Array) -> None:
-    """Elevation of the surface over each station [m, up]; zero in a calm sea.
-
-    Parameters
-    ----------
-    w : Components. c : Cells. y : (12,) state. time : [s].
-    out : (s,) result.
-    """
-    m = np.empty((3, 3))
-    fill_rotation(y[9], y[10], y[11], m)
-    for i in range(c.stations.size):
-        north, east = y[6] + m[0, 0] * c.stations[i], y[7] + m[1, 0] * c.stations[i]
-        out[i] = 0.0
-        for j in range(w.amplitude.size):
-            angle = w.number[j] * (w.north[j] * north + w.east[j] * east) - w.frequency[j] * time + w.phase[j]
-            out[i] += w.amplitude[j] * np.cos(angle)
-
-
-@njit(cache=True, error_model="numpy")
-def lost_buoyancy(c: Cells, y: Array, surface: Array, specific_weight: float, out: Array) -> float:
+def lost_buoyancy(c: Cells, y: Array, surface: Array, specific_weight: float, out: Array, dry: Array) -> float:
     """Load to add to the fully submerged one where the boat is out of the water.
 
     Parameters
@@ -158,13 +146,16 @@ def lost_buoyancy(c: Cells, y: Array, surface: Array, specific_weight: float, ou
     surface : (s,) elevation over each station [m, up]; zeros in calm water.
     specific_weight : rho g [N/m^3].
     out : (6,) X Y Z K M N about the body origin [N, N m].
+    dry : (k,) emerged volume that belongs to each section [m^3].
 
     Returns
     -------
-    Emerged share of the volume, 0 (and ``out`` zero) when submerged.
+    Emerged share of the volume, 0 (and ``out`` and ``dry`` zero) when submerged.
     """
     for i in range(6):
         out[i] = 0.0
+    for i in range(dry.size):
+        dry[i] = 0.0
     lowest = 0.0
     for i in range(surface.size):
         lowest = min(lowest, surface[i])
@@ -174,18 +165,19 @@ def lost_buoyancy(c: Cells, y: Array, surface: Array, specific_weight: float, ou
     top = min(a * c.low[0], a * c.high[0]) + min(b * c.low[1], b * c.high[1]) + min(d * c.low[2], d * c.high[2])
     if y[8] + top + lowest > 0.0:
         return 0.0
-    dry, mx, my, mz = 0.0, 0.0, 0.0, 0.0
+    total, mx, my, mz = 0.0, 0.0, 0.0, 0.0
     for i in range(c.volumes.size):
         depth = y[8] + a * c.boxes[i, 0] + b * c.boxes[i, 1] + d * c.boxes[i, 2] + surface[c.station[i]]
         half = abs(a) * c.halves[i, 0] + abs(b) * c.halves[i, 1] + abs(d) * c.halves[i, 2]
         if depth < half:
             share = c.volumes[i] * min(1.0, 0.5 * (half - depth) / half)
-            dry += share
+            total += share
+            dry[c.section[i]] += share
             mx += share * c.points[i, 0]
             my += share * c.points[i, 1]
             mz += share * c.points[i, 2]
     # Lost lift: a weight of water, downward along (a, b, d) in body axes, at the dry centroid.
     fx, fy, fz = specific_weight * a, specific_weight * b, specific_weight * d
-    out[0], out[1], out[2] = dry * fx, dry * fy, dry * fz
+    out[0], out[1], out[2] = total * fx, total * fy, total * fz
     out[3], out[4], out[5] = my * fz - mz * fy, mz * fx - mx * fz, mx * fy - my * fx
-    return dry / c.volumes.sum()
+    return total / c.volumes.sum()

@@ -1,21 +1,28 @@
-"""A vehicle in waves: its volume points, sections and probes gathered for ``sim.wave_loads``."""
+"""A vehicle in waves or near the surface: its geometry gathered for ``sim.surroundings``."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sim.catalogue import ACCELERATIONS, OUTPUTS
+from sim.emergence import Cells, cells
 from sim.errors import InputError
+from sim.mesh import Mesh
 from sim.pressure import Quadrature, quadrature
 from sim.surface import read_geometry
-from sim.wave_loads import Sea, make_sea
+from sim.surroundings import Surroundings
+from sim.wave_loads import Sea, make_sea, passage
 from sim.waves import Waves
 
 if TYPE_CHECKING:
     from sim.coefficients import Coefficients
+    from sim.kernel import Model
     from sim.model import Environment
     from sim.vehicle import Vehicle
 
@@ -77,10 +84,8 @@ def probes(vehicle: Vehicle) -> Array:
     return np.array([*[p.position for p in vehicle.planes], position.value], dtype=float)
 
 
-def volume_points(vehicle: Vehicle, environment: Environment) -> Quadrature:
-    """Volume points of a vehicle, scaled to its displaced mass.
-
-    With the surface's own volume instead, a neutrally buoyant boat would not follow long waves.
+def _mesh(vehicle: Vehicle) -> Mesh:
+    """The surface of a vehicle.
 
     Raises
     ------
@@ -88,31 +93,150 @@ def volume_points(vehicle: Vehicle, environment: Environment) -> Quadrature:
         When the vehicle names no geometry, or the geometry file is wrong.
     """
     if vehicle.geometry is None:
-        raise InputError(f"vehicle {vehicle.name}, key geometry", "nothing", "a geometry file: waves need it")
+        where = f"vehicle {vehicle.name}, key geometry"
+        raise InputError(where, "nothing", "a geometry file: waves and emergence need it")
+    return read_geometry(vehicle.geometry)
+
+
+def volume_points(vehicle: Vehicle, environment: Environment) -> Quadrature:
+    """Volume points of a vehicle, scaled to its displaced mass; raises as ``read_geometry``.
+
+    With the surface's own volume instead, a neutrally buoyant boat would not follow long waves.
+    """
     particulars = vehicle.particulars
     displaced = particulars.displaced_mass.value / environment.density
-    return quadrature(read_geometry(vehicle.geometry), _SHORTEST * particulars.length.value, displaced)
+    return quadrature(_mesh(vehicle), _SHORTEST * particulars.length.value, displaced)
 
 
-def sea_around(coefficients: Coefficients, environment: Environment, waves: Waves, span: float = 0.4) -> Sea:
-    """Waves and the vehicle in them, for ``wave_loads.advance`` and ``wave_loads.at``.
+@lru_cache(maxsize=8)
+def _cells(
+    geometry: str, displaced: float, centre: tuple[float, ...], sections: tuple[tuple[float, ...], ...]
+) -> Cells:
+    # A second of work, and the same for every flight of a vehicle.
+    return cells(read_geometry(Path(geometry)), displaced=displaced, centre=centre, sections=np.array(sections))
+
+
+def hull_cells(vehicle: Vehicle, environment: Environment, sections: Array) -> Cells:
+    """Cells of a hull for emergence, scaled and shifted to its displaced mass and centre of buoyancy.
+
+    Parameters
+    ----------
+    vehicle : With a geometry; raises ``InputError`` without.
+    environment : Water density.
+    sections : (k, 3) centres of the sections that carry added mass [m].
+    """
+    particulars = vehicle.particulars
+    displaced = particulars.displaced_mass.value / environment.density
+    if vehicle.geometry is None:
+        _mesh(vehicle)
+    centre = tuple(float(v) for v in particulars.centre_of_buoyancy.value)
+    return _cells(str(vehicle.geometry), displaced, centre, tuple(map(tuple, sections.tolist())))
+
+
+@dataclass(frozen=True)
+class Water:
+    """Waves and the surface around a vehicle, shared by every flight of it.
+
+    Attributes
+    ----------
+    sea : Waves and the boat's points in them; calm without components.
+    cells : Of the hull, for emergence.
+    centres, masses : (k, 3) sections that carry added mass [m], [kg].
+    specific_weight : rho g [N/m^3].
+    """
+
+    sea: Sea
+    cells: Cells
+    centres: Array
+    masses: Array
+    specific_weight: float
+
+
+def water_around(coefficients: Coefficients, environment: Environment, waves: Waves, span: float = 0.4) -> Water:
+    """Waves, perhaps none, and the surface around a vehicle.
 
     Parameters
     ----------
     coefficients : Of the vehicle.
     environment : Water density and gravity.
-    waves : Components; without any, nothing of the geometry is read and the sea is calm.
+    waves : Components.
     span : Time between sums of the waves [s].
 
     Raises
     ------
     InputError
-        When the vehicle lacks what waves need.
+        When the vehicle lacks what waves or emergence need.
     """
     vehicle = coefficients.vehicle
-    if waves.amplitude.size == 0:
-        empty = np.zeros((0, 3))
-        return make_sea(waves, Quadrature(empty, np.zeros(0)), empty, empty, empty, span)
     volume = volume_points(vehicle, environment)
     centres, masses = section_masses(coefficients, environment, volume)
-    return make_sea(waves, volume, centres, masses, probes(vehicle), span)
+    hull = hull_cells(vehicle, environment, centres)
+    places = probes(vehicle) if waves.amplitude.size else np.zeros((0, 3))
+    box = np.stack([hull.low, hull.high])
+    sea = make_sea(waves, volume, centres, masses, places, span, stations=hull.stations, box=box)
+    return Water(sea, hull, centres, masses, environment.density * environment.gravity)
+
+
+def _root(matrix: Array, power: float) -> Array:
+    """A power of a symmetric, positive semidefinite matrix on its range."""
+    values, vectors = np.linalg.eigh(matrix)
+    kept = values > 1e-12 * values.max(initial=0.0)
+    return np.asarray((vectors[:, kept] * values[kept] ** power) @ vectors[:, kept].T)
+
+
+def shares(added: Array, centres: Array, masses: Array) -> Array:
+    """Divide the added mass of a boat among its sections.
+
+    The sections' own sum differs from the left-hand side's (Table 6 and a panel method); the
+    congruence G = A^1/2 A_sections^-1/2 turns each section's J^T m J into a part of A, so that
+    the parts of whatever is wet are positive semidefinite and all of them together are A.
+
+    Parameters
+    ----------
+    added : (6, 6) of the left-hand side.
+    centres, masses : (k, 3) of the sections.
+
+    Returns
+    -------
+    (k + 1, 6, 6), the last what no section carries.
+    """
+    scale = np.array([1.0, 1.0, 1.0, *[max(float(np.abs(centres).max(initial=0.0)), 1.0)] * 3])
+    parts = np.zeros((len(centres) + 1, 6, 6))
+    for k, (r, m) in enumerate(zip(centres, masses, strict=True)):
+        x, y, z = r
+        motion = np.hstack([np.eye(3), -np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])]) / scale
+        parts[k] = motion.T @ (m[:, None] * motion)
+    own = added / np.outer(scale, scale)
+    turn = _root(0.5 * (own + own.T), 0.5) @ _root(parts.sum(axis=0), -0.5)
+    parts[:-1] = turn @ parts[:-1] @ turn.T
+    parts *= np.outer(scale, scale)
+    parts[-1] = added - parts[:-1].sum(axis=0)
+    return parts
+
+
+def surroundings(water: Water, model: Model) -> Surroundings:
+    """The water around one boat and thread, with scratch arrays of its own.
+
+    Parameters
+    ----------
+    water : Shared.
+    model : The boat, with the added mass of the left-hand side.
+    """
+    sums, count = passage(water.sea), len(water.centres)
+    volume = np.bincount(water.cells.section, weights=water.cells.volumes, minlength=count).astype(float)
+    return Surroundings(
+        sea=water.sea,
+        sums=sums,
+        cells=water.cells,
+        added=np.ascontiguousarray(model.added_mass),
+        parts=shares(model.added_mass, water.centres, water.masses),
+        volume=volume,
+        specific_weight=water.specific_weight,
+        clock=np.zeros(2),
+        found=np.zeros(sums.value.shape[1]),
+        felt=np.zeros(12),
+        lost=np.zeros(6),
+        dry=np.zeros(count),
+        wet=np.zeros((6, 6)),
+        emerged=np.zeros(1),
+    )

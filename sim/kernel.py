@@ -6,6 +6,7 @@ scalars built by ``sim.model``; angles are radians, the rest SI, frame SNAME.
 State ``y`` (12,): u v w p q r [m/s, rad/s], x y z [m, earth, z down], phi theta psi [rad].
 Controls ``c``: one deflection a plane [rad], then n [1/s]; a boat that uses its tanks has two
 more, ballast [kg] and the shift of the centre of gravity by the trim tank [m, forward].
+Waves and a surface in reach are ``sim.surroundings``, in the scratch arrays of a thread.
 """
 
 from __future__ import annotations
@@ -18,6 +19,8 @@ from numba import njit
 from numba.extending import overload
 
 from sim.catalogue import BOAT_FEATURES, PLANE_FEATURES
+from sim.surroundings import Around, add_loads, observe, tick
+from sim.wave_loads import PROBES
 
 HOLD, LINEAR, LINEAR_LOAD = 0, 1, 2
 N_BOAT, N_PLANE = len(BOAT_FEATURES), len(PLANE_FEATURES)
@@ -39,7 +42,7 @@ class Model(NamedTuple):
         coefficients, first row in ``data``; data : (rows, WIDTH) grid nodes, coefficients.
     links : (l, 2) axis and stride; axes : (a, 4) feature, rule, first node, nodes.
     terms : (k, 5) output and four factors of each coefficient; scale : (k,) its load scale.
-    mass_matrix : (6, 6) rigid-body plus added mass. tank : where ballast is taken [m], or
+    mass_matrix : (6, 6) rigid-body plus added mass; added_mass : (6, 6) of it. tank : where ballast is taken [m], or
         empty: a boat without tanks in use is compiled without them, a fifth faster.
     """
 
@@ -62,11 +65,12 @@ class Model(NamedTuple):
     terms: np.ndarray
     scale: np.ndarray
     mass_matrix: np.ndarray
+    added_mass: np.ndarray
     tank: tuple[()] | tuple[float, float, float]
 
 
 class Work(NamedTuple):
-    """Scratch arrays of one thread."""
+    """Scratch arrays of one thread; ``around`` is empty in deep, calm water."""
 
     features: np.ndarray
     values: np.ndarray
@@ -76,10 +80,11 @@ class Work(NamedTuple):
     lower: np.ndarray
     fraction: np.ndarray
     system: np.ndarray
+    around: Around
 
 
-def workspace(n_planes: int) -> Work:
-    """Scratch arrays for a vehicle with ``n_planes`` planes."""
+def workspace(n_planes: int, around: Around = ()) -> Work:
+    """Scratch arrays for a vehicle with ``n_planes`` planes, and what surrounds it."""
     return Work(
         np.ones(N_BOAT + N_PLANE * n_planes + 1),
         np.zeros(WIDTH),
@@ -89,12 +94,25 @@ def workspace(n_planes: int) -> Work:
         np.zeros(MAX_AXES, dtype=np.int64),
         np.zeros(MAX_AXES),
         np.zeros((6, 7)),
+        around,
     )
 
 
 @njit(cache=True, error_model="numpy", inline="always")
 def _sign(x: float) -> float:
     return 1.0 if x > 0.0 else (-1.0 if x < 0.0 else 0.0)
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def _fill_plane(m: Model, i: int, a: float, b: float, d: float, c: np.ndarray, f: np.ndarray) -> None:
+    """Speed, effective angle and deflection of a plane from its velocity through the water."""
+    size = sqrt(a * a + b * b + d * d)
+    incidence = 0.0
+    if size > 0.0:
+        sine = -(a * m.planes[i, 3] + b * m.planes[i, 4] + d * m.planes[i, 5]) / size
+        incidence = asin(min(1.0, max(-1.0, sine)))
+    k = N_BOAT + N_PLANE * i
+    f[k], f[k + 1], f[k + 2] = size, c[i] + incidence, c[i]
 
 
 @njit(cache=True, error_model="numpy", inline="always")
@@ -122,16 +140,33 @@ def fill_features(m: Model, y: np.ndarray, c: np.ndarray, f: np.ndarray) -> None
     f[34], f[35] = (v / speed, r / speed) if speed > 0.0 else (0.0, 0.0)
     for i in range(n_planes):
         x, yy, z = m.planes[i, 0], m.planes[i, 1], m.planes[i, 2]
-        a = u + q * z - r * yy
-        b = v + r * x - p * z
-        d = w + p * yy - q * x
-        size = sqrt(a * a + b * b + d * d)
-        incidence = 0.0
-        if size > 0.0:
-            sine = -(a * m.planes[i, 3] + b * m.planes[i, 4] + d * m.planes[i, 5]) / size
-            incidence = asin(min(1.0, max(-1.0, sine)))
-        k = N_BOAT + N_PLANE * i
-        f[k], f[k + 1], f[k + 2] = size, c[i] + incidence, c[i]
+        _fill_plane(m, i, u + q * z - r * yy, v + r * x - p * z, w + p * yy - q * x, c, f)
+
+
+def _sense(m: Model, y: np.ndarray, c: np.ndarray, around: Around, f: np.ndarray) -> None:
+    """Features of the motion relative to the water, which planes and propeller meet where they are."""
+    a = around
+    fill_features(m, a.felt, c, f)
+    if a.sea.waves.amplitude.size == 0:
+        return
+    u, v, w, p, q, r = y[0], y[1], y[2], y[3], y[4], y[5]
+    n_planes, k = m.planes.shape[0], PROBES
+    for i in range(n_planes):
+        x, yy, z = m.planes[i, 0], m.planes[i, 1], m.planes[i, 2]
+        along = u + q * z - r * yy - a.found[k]
+        _fill_plane(m, i, along, v + r * x - p * z - a.found[k + 1], w + p * yy - q * x - a.found[k + 2], c, f)
+        k += 3
+    n = c[n_planes]
+    f[21] = (1.0 - m.wake) * (u - a.found[k]) / (n * m.diameter) if n != 0.0 else 0.0
+
+
+def _sense_calm(m: Model, y: np.ndarray, c: np.ndarray, around: Around, f: np.ndarray) -> None:
+    fill_features(m, y, c, f)
+
+
+@overload(_sense)
+def _choose_sense(m: Model, y: np.ndarray, c: np.ndarray, around: Around, f: np.ndarray) -> object:
+    return _sense if len(around) else _sense_calm
 
 
 @njit(cache=True, error_model="numpy", inline="always")
@@ -224,18 +259,11 @@ def _tank_loads(m: Model, y: np.ndarray, c: np.ndarray, tank: tuple[float, ...],
     out[5] += sx * ay - sy * ax - turn * (p * yy - q * x)
 
 
-def _accelerate(m: Model, c: np.ndarray, tank: tuple[float, ...], a: np.ndarray, dy: np.ndarray) -> None:
-    """Turn six loads in ``dy`` into accelerations, with the tanks in the mass matrix.
-
-    Elimination without pivoting, because the matrix is positive definite; ``a`` is scratch.
-    """
+def _fill_tanks(m: Model, c: np.ndarray, tank: tuple[float, ...], a: np.ndarray) -> None:
+    """Add what the tanks change to the mass matrix."""
     dm, shift = c[m.planes.shape[0] + 1], c[m.planes.shape[0] + 2]
     x, y, z = tank
     sx, sy, sz = m.mass * shift + dm * x, dm * y, dm * z
-    for i in range(6):
-        for j in range(6):
-            a[i, j] = m.mass_matrix[i, j]
-        a[i, 6] = dy[i]
     for i in range(3):
         a[i, i] += dm
     for i, j, moment in ((0, 4, sz), (0, 5, -sy), (1, 3, -sz), (1, 5, sx), (2, 3, sy), (2, 4, -sx)):
@@ -247,6 +275,14 @@ def _accelerate(m: Model, c: np.ndarray, tank: tuple[float, ...], a: np.ndarray,
     a[3, 3] += dm * (y * y + z * z)
     a[4, 4] += dm * (x * x + z * z)
     a[5, 5] += dm * (x * x + y * y)
+
+
+@njit(cache=True, error_model="numpy")
+def _solve(a: np.ndarray, dy: np.ndarray) -> None:
+    """Accelerations from a mass matrix with six loads in column 6, into ``dy``.
+
+    Elimination without pivoting, because the matrix is positive definite.
+    """
     for k in range(6):
         for i in range(k + 1, 6):
             factor = a[i, k] / a[k, k]
@@ -263,7 +299,13 @@ def _no_tank_loads(m: Model, y: np.ndarray, c: np.ndarray, tank: tuple[float, ..
     pass
 
 
-def _accelerate_dry(m: Model, c: np.ndarray, tank: tuple[float, ...], a: np.ndarray, dy: np.ndarray) -> None:
+def _no_tanks(m: Model, c: np.ndarray, tank: tuple[float, ...], a: np.ndarray) -> None:
+    pass
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def _multiply(m: Model, dy: np.ndarray) -> None:
+    """Accelerations by the inverse mass matrix of the model."""
     f0, f1, f2, f3, f4, f5 = dy[0], dy[1], dy[2], dy[3], dy[4], dy[5]
     inverse = m.inverse_mass
     for i in range(6):
@@ -278,15 +320,77 @@ def _accelerate_dry(m: Model, c: np.ndarray, tank: tuple[float, ...], a: np.ndar
 
 
 # A branch at run time, even one never taken, costs a fifth of the right-hand side, so the
-# compiler chooses by the type of ``tank``.
+# compiler chooses by the types of ``tank`` and ``around``.
 @overload(_tank_loads, inline="always")
 def _choose_loads(m: Model, y: np.ndarray, c: np.ndarray, tank: tuple[float, ...], out: np.ndarray) -> object:
     return _tank_loads if len(tank) else _no_tank_loads
 
 
+@overload(_fill_tanks, inline="always")
+def _choose_tanks(m: Model, c: np.ndarray, tank: tuple[float, ...], a: np.ndarray) -> object:
+    return _fill_tanks if len(tank) else _no_tanks
+
+
+def _dry_part(around: Around, a: np.ndarray) -> None:
+    """Take the added mass of what is out of the water from the mass matrix."""
+
+
+def _no_dry_part(around: Around, a: np.ndarray) -> None:
+    pass
+
+
+def _some_dry_part(around: Around, a: np.ndarray) -> None:
+    if around.emerged[0] > 0.0:
+        for i in range(6):
+            for j in range(6):
+                a[i, j] += around.wet[i, j] - around.added[i, j]
+
+
+@overload(_dry_part, inline="always")
+def _choose_dry_part(around: Around, a: np.ndarray) -> object:
+    return _some_dry_part if len(around) else _no_dry_part
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def _eliminate(m: Model, c: np.ndarray, work: Work, dy: np.ndarray) -> None:
+    """Accelerations with the mass matrix as tanks and emergence make it now."""
+    a = work.system
+    for i in range(6):
+        for j in range(6):
+            a[i, j] = m.mass_matrix[i, j]
+        a[i, 6] = dy[i]
+    _fill_tanks(m, c, m.tank, a)
+    _dry_part(work.around, a)
+    _solve(a, dy)
+
+
+def _accelerate(m: Model, c: np.ndarray, tank: tuple[float, ...], around: Around, work: Work, dy: np.ndarray) -> None:
+    """Turn six loads in ``dy`` into accelerations; by elimination only where the matrix changes."""
+    _eliminate(m, c, work, dy)
+
+
+def _accelerate_calm(
+    m: Model, c: np.ndarray, tank: tuple[float, ...], around: Around, work: Work, dy: np.ndarray
+) -> None:
+    _multiply(m, dy)
+
+
+def _accelerate_surfacing(
+    m: Model, c: np.ndarray, tank: tuple[float, ...], around: Around, work: Work, dy: np.ndarray
+) -> None:
+    if around.emerged[0] > 0.0:
+        _eliminate(m, c, work, dy)
+    else:
+        _multiply(m, dy)
+
+
 @overload(_accelerate, inline="always")
-def _choose_accelerate(m: Model, c: np.ndarray, tank: tuple[float, ...], a: np.ndarray, dy: np.ndarray) -> object:
-    return _accelerate if len(tank) else _accelerate_dry
+def _choose_accelerate(
+    m: Model, c: np.ndarray, tank: tuple[float, ...], around: Around, work: Work, dy: np.ndarray
+) -> object:
+    if len(tank):
+        return _accelerate
+    return _accelerate_surfacing if len(around) else _accelerate_calm
 
 
 @njit(cache=True, error_model="numpy")
@@ -302,9 +406,11 @@ def rhs(m: Model, y: np.ndarray, c: np.ndarray, work: Work, dy: np.ndarray) -> N
     work : Scratch arrays.
     dy : (12,) result.
     """
-    fill_features(m, y, c, work.features)
+    observe(work.around, y)
+    _sense(m, y, c, work.around, work.features)
     loads(m, work)
     _tank_loads(m, y, c, m.tank, work.loads)
+    add_loads(work.around, y, work.loads)
     u, v, w, p, q, r = y[0], y[1], y[2], y[3], y[4], y[5]
     phi, theta, psi = y[9], y[10], y[11]
     sf, cf, st, ct, sp, cp = sin(phi), cos(phi), sin(theta), cos(theta), sin(psi), cos(psi)
@@ -326,7 +432,7 @@ def rhs(m: Model, y: np.ndarray, c: np.ndarray, work: Work, dy: np.ndarray) -> N
     f4 = work.loads[4] + mz * gx - mx * gz - (r * hx - p * hz) - m.mass * (zg * cx - xg * cz)
     f5 = work.loads[5] + mx * gy - my * gx - (p * hy - q * hx) - m.mass * (xg * cy - yg * cx)
     dy[0], dy[1], dy[2], dy[3], dy[4], dy[5] = f0, f1, f2, f3, f4, f5
-    _accelerate(m, c, m.tank, work.system, dy)
+    _accelerate(m, c, m.tank, work.around, work, dy)
     dy[6] = ct * cp * u + (sf * st * cp - cf * sp) * v + (cf * st * cp + sf * sp) * w
     dy[7] = ct * sp * u + (sf * st * sp + cf * cp) * v + (cf * st * sp - sf * cp) * w
     dy[8] = -st * u + sf * ct * v + cf * ct * w
@@ -348,6 +454,8 @@ def rk4(
 ) -> None:
     """One classical Runge-Kutta step with controls that move at constant rate.
 
+    With surroundings, ``sim.surroundings.prepare`` comes before the step.
+
     Parameters
     ----------
     y, out : (12,) states before and after (may be the same array).
@@ -356,7 +464,9 @@ def rk4(
     stages : (6, 12) scratch; row 5 also carries the controls, so at most 12 of them.
     """
     k1, k2, k3, k4, z, moved = stages[0], stages[1], stages[2], stages[3], stages[4], stages[5]
+    tick(work.around, 0.0)
     rhs(m, y, c, work, k1)
+    tick(work.around, 0.5 * h)
     for i in range(c.size):
         moved[i] = c[i] + 0.5 * h * rate[i]
     for i in range(12):
@@ -369,6 +479,7 @@ def rk4(
         moved[i] = c[i] + h * rate[i]
     for i in range(12):
         z[i] = y[i] + h * k3[i]
+    tick(work.around, h)
     rhs(m, z, moved, work, k4)
     for i in range(12):
         out[i] = y[i] + h / 6.0 * (k1[i] + 2.0 * k2[i] + 2.0 * k3[i] + k4[i])

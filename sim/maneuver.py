@@ -15,6 +15,7 @@ from numba import njit
 
 from sim.events import HORIZONTAL, REVOLUTIONS, RUN, VERTICAL, Programme, Progress, advance, progress, step_past, watch
 from sim.kernel import Model, Work, rhs, rk4, workspace
+from sim.surroundings import Surroundings, prepare
 
 FIXED, PID, ZIGZAG, PROGRAMME, YAW_RATE = 0, 1, 2, 3, 4
 N_COMMANDS, N_INTEGRALS = 5, 10
@@ -299,6 +300,7 @@ def run(
     if zigzag:
         executes[0, 0], executes[0, 1], events = 0.0, s.value[axis], 1
     for step in range(steps + 1):
+        prepare(work.around, y, step * dt)
         rhs(m, y, c, work, dy)
         if programmed:
             watch(s.programme, state, y, dy, step * dt)
@@ -315,6 +317,7 @@ def run(
         left = dt
         while left > 0.0:
             now = step * dt + (dt - left)
+            prepare(work.around, y, now)
             rk4(m, y, c, rate, left, work, stages, trial)
             part = left
             happens = (zigzag or programmed) and _past(s, state, trial, now + left) >= 0.0
@@ -359,15 +362,21 @@ class Flown(NamedTuple):
 
 
 def fly_logged(
-    model: Model, settings: Settings, y0: np.ndarray, c0: np.ndarray, dt: float, steps: int, every: int
+    model: Model,
+    settings: Settings,
+    y0: np.ndarray,
+    c0: np.ndarray,
+    dt: float,
+    steps: int,
+    every: int,
+    around: tuple[()] | Surroundings = (),
 ) -> Flown:
-    """``run`` with its arrays allocated."""
+    """``run`` with its arrays allocated, in calm, deep water or what is ``around``."""
     record = np.zeros((steps // every + 1, 15 + c0.size))
     executes, log = np.zeros((256, 2)), np.zeros((256, 3))
     y, c, state = y0.copy(), c0.copy(), progress(settings.programme, y0)
-    rows, events, logged, end = run(
-        model, settings, state, y, c, dt, steps, every, workspace(len(settings.mixer)), record, executes, log
-    )
+    work = workspace(len(settings.mixer), around)
+    rows, events, logged, end = run(model, settings, state, y, c, dt, steps, every, work, record, executes, log)
     flown = record[:rows]
     finite = flown[np.isfinite(flown).all(axis=1)]
     return Flown(finite, executes[: min(events, len(executes))], log[:logged], np.append(end, y))

@@ -233,7 +233,8 @@ def assemble(coefficients: Coefficients, environment: Environment) -> kernel.Mod
     particulars = vehicle.particulars
     if len(flat.axis) > kernel.MAX_AXES:
         raise ValueError(f"{vehicle.name}: {len(flat.axis)} table axes, at most {kernel.MAX_AXES}")
-    total = mass + added_mass_matrix(coefficients, environment)
+    added = added_mass_matrix(coefficients, environment)
+    total = mass + added
     planes = [[*p.position, *p.lift_axis] for p in vehicle.planes]
     return kernel.Model(
         inverse_mass=np.linalg.inv(total),
@@ -255,6 +256,7 @@ def assemble(coefficients: Coefficients, environment: Environment) -> kernel.Mod
         terms=np.array([[k[0], *k[2]] for k in flat.coefficient], dtype=np.int64).reshape(-1, 1 + MAX_FACTORS),
         scale=np.array([k[1] for k in flat.coefficient], dtype=float),
         mass_matrix=total,
+        added_mass=added,
         tank=(),
     )
 
@@ -296,10 +298,12 @@ class Assembly:
     def model(self, values: Array) -> kernel.Model:
         """The kernel's model at (rows,) values, in the order of the rows of the coefficients."""
         # einsum and not BLAS: the sum does not depend on how many threads BLAS may use.
-        total = self._rigid + np.einsum("k,kij->ij", values[self._added], self._units)
+        added = np.einsum("k,kij->ij", values[self._added], self._units)
+        total = self._rigid + added
         return self._base._replace(
             data=(self._data @ values).reshape(-1, kernel.WIDTH),
             mass_matrix=total,
+            added_mass=added,
             inverse_mass=np.linalg.inv(total),
             wake=0.0 if self._wake is None else float(values[self._wake]),
         )

@@ -13,12 +13,17 @@ from sim.case import Case
 from sim.coefficients import Coefficients
 from sim.commands import compile_programme, law_code
 from sim.errors import InputError
+from sim.in_waves import Water, surroundings, water_around
 from sim.kernel import Model
 from sim.model import Environment, assemble, weight_across, with_tanks
+from sim.spectra import Spectrum, realise, sea_state
 from sim.trim import Trim, self_propulsion
 from sim.vehicle import Vehicle
+from sim.waves import Waves, make_waves, regular
 
 Array = NDArray[np.float64]
+# Time between sums of the waves [s], or the step if that is longer.
+_SPAN = 0.4
 _STATES = ("u", "v", "w", "p", "q", "r", "x", "y", "z", "phi", "theta", "psi")
 
 # Channels a reference may hold, with the unit of the simulation.
@@ -46,6 +51,7 @@ class Simulation:
     steps : (k, 3) time [s], axis (dV, dH, n, run) and number of each programme step that ended.
     end : (13,) time [s] and state at the end of the run, which an event may place between
         two records.
+    waves : Of the run; None in deep, calm water.
     """
 
     columns: tuple[str, ...]
@@ -56,6 +62,7 @@ class Simulation:
     length: float
     steps: Array
     end: Array
+    waves: Waves | None = None
 
     def __getitem__(self, column: str) -> Array:
         """One column by name; those of ``DERIVED``, are computed.
@@ -196,11 +203,11 @@ def settings_of(case: Case, vehicle: Vehicle, state: Array, controls: Array, tri
 
 
 def simulate(case: Case, coefficients: Coefficients) -> Simulation:
-    """Fly a case with the coefficients of its vehicle; raises as ``model_of`` and ``fly``."""
-    return fly(case, coefficients.vehicle, model_of(case, coefficients))
+    """Fly a case with the coefficients of its vehicle; raises as ``model_of``, ``water_of`` and ``fly``."""
+    return fly(case, coefficients.vehicle, model_of(case, coefficients), water_of(case, coefficients))
 
 
-def fly(case: Case, vehicle: Vehicle, model: Model) -> Simulation:
+def fly(case: Case, vehicle: Vehicle, model: Model, water: Water | None) -> Simulation:
     """Fly a case with an assembled model.
 
     Parameters
@@ -208,6 +215,7 @@ def fly(case: Case, vehicle: Vehicle, model: Model) -> Simulation:
     case : From ``load_case``.
     vehicle : The case's.
     model : From ``model_of``, which may be flown more than once.
+    water : From ``water_of``, likewise; None in deep, calm water.
 
     Returns
     -------
@@ -223,7 +231,8 @@ def fly(case: Case, vehicle: Vehicle, model: Model) -> Simulation:
         model = weight_across(model, trim.lateral)
     settings = settings_of(case, vehicle, state, controls, trim)
     dt, (steps, every) = case.run.step_s, samples_of(case)
-    flown = maneuver.fly_logged(model, settings, state, controls, dt, steps, every)
+    around = surroundings(water, model) if water else ()
+    flown = maneuver.fly_logged(model, settings, state, controls, dt, steps, every, around)
     return Simulation(
         columns=columns_of(vehicle, bool(model.tank)),
         record=flown.record,
@@ -233,6 +242,7 @@ def fly(case: Case, vehicle: Vehicle, model: Model) -> Simulation:
         length=vehicle.particulars.length.value,
         steps=flown.log,
         end=flown.end,
+        waves=water.sea.waves if water else None,
     )
 
 
@@ -245,6 +255,48 @@ def model_of(case: Case, coefficients: Coefficients) -> Model:
         When the vehicle has no tanks.
     """
     return equipped(case, coefficients.vehicle, assemble(coefficients, environment_of(case)))
+
+
+def waves_of(case: Case) -> Waves:
+    """Wave components of a case; none in calm water.
+
+    Raises
+    ------
+    InputError
+        When the case asks for a sea state that the table does not have.
+    """
+    density, gravity = case.environment.density_kgpm3, case.environment.gravity_mps2
+    data = case.waves
+    if data is None:
+        nothing = np.zeros(0)
+        return make_waves(nothing, nothing, nothing, nothing, density, gravity)
+    direction = math.radians(data.direction_deg)
+    if data.kind == "regular":
+        length = data.length_m or gravity * (data.period_s or 0.0) ** 2 / (2.0 * math.pi)
+        return regular(data.height_m or 0.0, length, direction, density, gravity, math.radians(data.phase_deg))
+    height, period = data.height_m or 0.0, data.period_s or 0.0
+    if data.sea_state is not None:
+        nominal = sea_state(data.sea_state)
+        height, period = nominal.height, nominal.period
+    spectrum = Spectrum(data.kind, height, period, direction, data.spreading, data.gamma)
+    return realise(spectrum, data.components, data.seed, density, gravity)
+
+
+def water_of(case: Case, coefficients: Coefficients) -> Water | None:
+    """Waves and surface of a case around its vehicle; None in deep, calm water.
+
+    Waves of zero height are calm water to the last digit.
+
+    Raises
+    ------
+    InputError
+        When the vehicle lacks the geometry or the place of the propeller that waves need.
+    """
+    waves = waves_of(case)
+    if not case.environment.free_surface and waves.amplitude.size == 0:
+        return None
+    dt = case.run.step_s
+    return water_around(coefficients, environment_of(case), waves, dt * max(1, round(_SPAN / dt)))
 
 
 def environment_of(case: Case) -> Environment:

@@ -195,8 +195,14 @@ def bundled(kind: str) -> list[str]:
     return sorted(p.name[:-5] for p in (files("sim") / kind).iterdir() if p.name.endswith(".toml"))
 
 
-def read_toml(name: str | Path, kind: str) -> tuple[dict[str, Any], str]:
+def read_toml(name: str | Path, kind: str, named_in: str = "") -> tuple[dict[str, Any], str]:
     """A bundled name or a path to a TOML file, as data and the name to report.
+
+    Parameters
+    ----------
+    name : The name or path.
+    kind : ``vehicles`` or ``cases``.
+    named_in : File and key that name it, for the message.
 
     Raises
     ------
@@ -211,9 +217,10 @@ def read_toml(name: str | Path, kind: str) -> tuple[dict[str, Any], str]:
     except OSError:
         there = False
     if not there:
-        raise InputError(
-            str(name)[:200], "no such file or bundled name", f"one of {', '.join(bundled(kind))}, or a path"
-        )
+        found, text = "no such file or bundled name", f"one of {', '.join(bundled(kind))}, or a path"
+        if named_in:
+            raise InputError(named_in, f"{str(name)[:200]!r}: {found}", text)
+        raise InputError(str(name)[:200], found, text)
     try:
         return tomllib.loads(path.read_text("utf-8")), str(path)
     except (ValueError, RecursionError) as error:
@@ -234,7 +241,8 @@ def load_vehicle(name: str | Path = "bb2", beside: str | Path = "") -> Vehicle:
         For a missing file, a missing or unknown key, or a value out of range.
     """
     path = Path(name)
-    data, where = read_toml(Path(beside).parent / path if path.suffix == ".toml" else name, "vehicles")
+    there = Path(beside).parent / path if path.suffix == ".toml" else name
+    data, where = read_toml(there, "vehicles", f"{beside}, key vehicle" if str(beside) else "")
     vehicle = checked(Vehicle, data, where)
     vehicle.frame.declared(where)
     if vehicle.geometry is not None:

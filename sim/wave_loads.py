@@ -4,13 +4,18 @@ Three linear functions of one wave field, over points fixed in the boat:
 
 * Froude-Krylov force, rho dv/dt summed over the volume points of ``sim.pressure``;
 * the added-mass impulse of the sections of Eqs. (36)-(41), I = sum J_i^T c_i m_i v_wave(r_i)
-  with J = [1, -[r]x], whose rate in body axes is the added-mass load of the waves. With the
-  hull's own -A d(nu)/dt on the left-hand side the load is -A d(nu - nu_water)/dt, where
-* nu_water = A^-1 I is the rigid motion with the same impulse: what the drift, rotation and
-  rotating-arm tables see as the water's motion; and the velocity at planes and propeller.
+  with J = [1, -[r]x], and nu_water, the rigid motion with the same impulse: what the drift,
+  rotation and rotating-arm tables see as the water's motion. The added-mass load of the waves
+  is A d(nu_water)/dt with the A of the left-hand side, so that both sides make one
+  -A d(nu - nu_water)/dt whatever the sections' own sum is, and a boat in long waves is
+  carried like the water;
+* the water's velocity at planes and propeller.
 
 The rate follows the sections as they move (encounter frequency), less Omega x v, because
 the tables hold the Munk and centripetal parts for the relative motion.
+
+The same sums give the elevation of the surface over stations of the boat, when it is near
+enough to come out of the water.
 
 All waves are summed once per ``span`` seconds at the predicted place of the boat, with
 rates, and interpolated by cubic Hermite polynomials in between. Sums of many components run
@@ -33,11 +38,15 @@ from sim.waves import Waves
 Array = NDArray[np.float64]
 Single = NDArray[np.float32]
 
-# Layout of the vector of wave quantities: then three velocities a probe.
+# Layout of the vector of wave quantities: then three velocities a probe, one elevation a station.
 FORCE, IMPULSE, WATER, PROBES = 0, 6, 12, 18
+# What ``at`` puts in the place of IMPULSE.
+WATER_RATE = IMPULSE
 # From this many components on, single precision in vector registers is faster.
 MANY = 8
 TWO_PI, HALF_PI = 2.0 * np.pi, 0.5 * np.pi
+# A crest higher than this many standard deviations of the elevation does not come.
+_HIGHEST = 6.0
 
 
 class Sea(NamedTuple):
@@ -45,10 +54,13 @@ class Sea(NamedTuple):
 
     waves : Components; a sea without components is calm and must not be evaluated.
     single : (6, n) k, k cos chi, k sin chi, omega, cos chi, sin chi in single precision.
-    points : (v + s + p, 3) volume points, section centres, probes in the body frame [m].
+    points : (v + s + p + e, 3) volume points, section centres, probes, stations over which the
+        elevation is wanted, in the body frame [m].
     masses : (v,) rho V of the volume points [kg].
     sections : (s, 3) c m in x, y, z of the sections [kg].
     compliance : (6, 6) inverse of the added mass; zero where there is none.
+    stations : e. box : (2, 3) corners of a box around the boat [m]. crest : Highest elevation
+        that can come [m].
     span : Time between sums [s]. reach : Largest miss of a predicted point that is accepted [m].
     """
 
@@ -58,6 +70,9 @@ class Sea(NamedTuple):
     masses: Array
     sections: Array
     compliance: Array
+    stations: int
+    box: Array
+    crest: float
     span: float
     reach: float
 
@@ -94,6 +109,8 @@ def make_sea(
     probes: Array,
     span: float = 0.4,
     reach: float = 0.05,
+    stations: Array | None = None,
+    box: Array | None = None,
 ) -> Sea:
     """Waves and a boat in them.
 
@@ -105,6 +122,8 @@ def make_sea(
     probes : (p, 3) where the water's velocity is wanted: planes, then propeller [m].
     span : Time between sums [s]; the error of the loads falls with its fourth power.
     reach : Largest accepted miss of a predicted point before the sum is done again [m].
+    stations : (e,) x over which the elevation is wanted [m]; none without.
+    box : (2, 3) corners of a box around the boat [m], with stations.
 
     Raises
     ------
@@ -119,15 +138,20 @@ def make_sea(
         x, y, z = r
         motion = np.hstack([np.eye(3), -np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])])
         added += motion.T @ (m[:, None] * motion)
-    k, w = waves.number, waves.frequency
+    along = np.zeros(0) if stations is None else np.asarray(stations, dtype=float)
+    over = np.column_stack([along, np.zeros((along.size, 2))])
+    k, w, a = waves.number, waves.frequency, waves.amplitude
     single = np.stack([k, k * waves.north, k * waves.east, w, waves.north, waves.east])
     return Sea(
         waves,
         np.ascontiguousarray(single, dtype=np.float32),
-        np.concatenate([volume.points, centres, probes]),
+        np.concatenate([volume.points, centres, probes, over]),
         waves.density * volume.volumes,
         masses,
         np.asarray(np.linalg.pinv(added, rcond=1e-12, hermitian=True), dtype=float),
+        along.size,
+        np.zeros((2, 3)) if box is None else np.asarray(box, dtype=float),
+        float(min(a.sum(), _HIGHEST * np.sqrt(0.5 * a @ a))),
         float(span),
         float(reach),
     )
@@ -136,17 +160,17 @@ def make_sea(
 def passage(sea: Sea) -> Passage:
     """Empty sums for one thread."""
     n, points = sea.waves.amplitude.size, len(sea.points)
-    width = PROBES + 3 * (points - len(sea.masses) - len(sea.sections))
+    width = PROBES + 3 * (points - len(sea.masses) - len(sea.sections) - sea.stations) + sea.stations
     return Passage(
         time=np.array([0.0, -1.0]),
         value=np.zeros((2, width)),
         slope=np.zeros((2, width)),
         state=np.zeros(12),
         before=np.zeros(6),
-        size=np.zeros((2, n)),
-        phase=np.zeros((2, n)),
-        single_size=np.zeros((2, n), dtype=np.float32),
-        single_phase=np.zeros((2, n), dtype=np.float32),
+        size=np.zeros((3, n)),
+        phase=np.zeros((3, n)),
+        single_size=np.zeros((3, n), dtype=np.float32),
+        single_phase=np.zeros((3, n), dtype=np.float32),
         place=np.zeros((points, 3)),
         motion=np.zeros((points, 3)),
         sums=np.zeros(6),
@@ -171,9 +195,12 @@ def _place(sea: Sea, y: Array, time: float, pas: Passage) -> None:
             pas.motion[i, k] = m[k, 0] * u + m[k, 1] * v + m[k, 2] * d
         # Above the calm surface the waves keep the values they have there.
         pas.place[i, 2] = max(y[8] + pas.place[i, 2], 0.0)
-        top = min(top, pas.place[i, 2])
+        if i < sea.points.shape[0] - sea.stations:
+            top = min(top, pas.place[i, 2])
     for i in range(sea.points.shape[0]):
         pas.place[i, 2] -= top
+    for i in range(sea.points.shape[0] - sea.stations, sea.points.shape[0]):
+        pas.place[i, 2] = pas.motion[i, 2] = 0.0
     for j in range(w.amplitude.size):
         angle = w.number[j] * (w.north[j] * y[6] + w.east[j] * y[7]) - w.frequency[j] * time + w.phase[j]
         angle -= TWO_PI * floor(angle / TWO_PI)
@@ -181,7 +208,9 @@ def _place(sea: Sea, y: Array, time: float, pas: Passage) -> None:
         # Acceleration is the velocity a quarter period earlier times the frequency.
         pas.size[0, j], pas.phase[0, j] = size * w.frequency[j], angle - HALF_PI
         pas.size[1, j], pas.phase[1, j] = size, angle
-        for kind in range(2):
+        # -sin a quarter period earlier is the cosine of the elevation.
+        pas.size[2, j], pas.phase[2, j] = w.amplitude[j], angle - HALF_PI
+        for kind in range(3):
             pas.single_size[kind, j] = pas.size[kind, j]
             pas.single_phase[kind, j] = pas.phase[kind, j]
 
@@ -210,6 +239,15 @@ def _add(points: Array, i: int, fx: float, fy: float, fz: float, out: Array, at:
 
 
 @njit(cache=True, error_model="numpy")
+def _near(sea: Sea, y: Array, matrix: Array) -> bool:
+    """Whether a crest can reach the boat before the next sums; ``matrix`` turns body to earth."""
+    top = y[8] - sea.span * sqrt(y[0] * y[0] + y[1] * y[1] + y[2] * y[2])
+    for k in range(3):
+        top += min(matrix[2, k] * sea.box[0, k], matrix[2, k] * sea.box[1, k])
+    return top <= sea.crest
+
+
+@njit(cache=True, error_model="numpy")
 def evaluate(sea: Sea, y: Array, time: float, pas: Passage, value: Array, slope: Array) -> None:
     """Every wave quantity at a state, exactly, with its rate along the present motion.
 
@@ -221,19 +259,25 @@ def evaluate(sea: Sea, y: Array, time: float, pas: Passage, value: Array, slope:
     pas : Scratch arrays.
     value, slope : (n,) results, body axes about the body origin: FORCE Froude-Krylov load
         [N, N m], IMPULSE [kg m/s, kg m^2/s], WATER u v w p q r [m/s, rad/s], PROBES three
-        velocities each [m/s]; and their rates. The rate of IMPULSE is the added-mass load.
+        velocities each [m/s], elevation over each station [m, up], zero where no crest comes
+        near the boat; and their rates. The rate of IMPULSE is the added-mass load.
     """
     _place(sea, y, time, pas)
     sums, body, many = pas.sums, pas.body, sea.waves.amplitude.size >= MANY
     n, s = sea.masses.size, sea.sections.shape[0]
+    submerged = sea.points.shape[0] - sea.stations
     for i in range(value.size):
         value[i] = slope[i] = 0.0
-    for i in range(sea.points.shape[0]):
-        kind = 0 if i < n else 1
+    for i in range(sea.points.shape[0] if _near(sea, y, pas.matrix) else submerged):
+        kind = 0 if i < n else (1 if i < submerged else 2)
         if many:
             sum_many(sea.single, pas.single_size, pas.single_phase, kind, pas.place, pas.motion, i, sums)
         else:
             sum_few(sea.waves, pas.size, pas.phase, kind, pas.place, pas.motion, i, sums)
+        if i >= submerged:
+            value[PROBES + 3 * (submerged - n - s) + i - submerged] = sums[2]
+            slope[PROBES + 3 * (submerged - n - s) + i - submerged] = sums[5]
+            continue
         _to_body(sums, pas.matrix, y, body)
         if i < n:
             m = sea.masses[i]
@@ -326,8 +370,9 @@ def at(pas: Passage, time: float, out: Array) -> None:
     ----------
     pas : After ``advance``.
     time : [s].
-    out : (n,) FORCE the whole wave load X Y Z K M N, Froude-Krylov and added mass
-        [N, N m]; IMPULSE as it is; WATER u v w p q r; PROBES.
+    out : (n,) FORCE Froude-Krylov load [N, N m]; WATER_RATE rate of the water's u v w p q r
+        along the motion [m/s^2, rad/s^2], which times the added mass is the added-mass load;
+        WATER; PROBES; elevations.
     """
     h = pas.time[1] - pas.time[0]
     t = (time - pas.time[0]) / h
@@ -337,5 +382,5 @@ def at(pas: Passage, time: float, out: Array) -> None:
         out[i] = a * pas.value[0, i] + b * pas.value[1, i] + c * pas.slope[0, i] + d * pas.slope[1, i]
     e, f, g = 6.0 * t * (1.0 - t) / h, (1.0 - t) * (1.0 - 3.0 * t), t * (3.0 * t - 2.0)
     for i in range(6):
-        k = IMPULSE + i
-        out[i] += e * (pas.value[1, k] - pas.value[0, k]) + f * pas.slope[0, k] + g * pas.slope[1, k]
+        k = WATER + i
+        out[WATER_RATE + i] = e * (pas.value[1, k] - pas.value[0, k]) + f * pas.slope[0, k] + g * pas.slope[1, k]

@@ -8,9 +8,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from sim.emergence import cells, elevations, lost_buoyancy
-from sim.pressure import rotation
+from sim.emergence import cells, lost_buoyancy
+from sim.pressure import Quadrature, rotation
+from sim.spectra import Spectrum, realise
 from sim.surface import read_geometry
+from sim.wave_loads import evaluate, make_sea, passage
 from sim.waves import kinematics, regular
 
 RHO_G = 1025.0 * 9.81
@@ -49,7 +51,7 @@ def _state(depth, phi=0.0, theta=0.0, psi=0.0):
 
 def _lost(c, y, surface=0.0):
     out = np.zeros(6)
-    share = lost_buoyancy(c, y, np.full(len(c.stations), surface), RHO_G, out)
+    share = lost_buoyancy(c, y, np.full(len(c.stations), surface), RHO_G, out, np.zeros(1))
     return share, out
 
 
@@ -126,13 +128,28 @@ def test_a_higher_surface_is_a_deeper_boat(boat):
     assert _lost(boat, _state(4.0), surface=1.5)[1] == pytest.approx(_lost(boat, _state(5.5))[1], rel=1e-9)
 
 
-def test_elevations_are_those_of_the_waves(boat):
-    waves = regular(3.25, 140.9, 2.0, 1025.0, 9.81)
+@pytest.mark.parametrize("components", [1, 30])
+def test_elevations_are_those_of_the_waves(boat, components):
+    one = regular(3.25, 140.9, 2.0, 1025.0, 9.81)
+    many = realise(Spectrum("bretschneider", 3.3, 9.7, 2.0, 5.0), components, 1, 1025.0, 9.81)
+    waves = one if components == 1 else many
     y = _state(10.0, 0.1, 0.2, 0.9)
     y[6:8] = 300.0, -80.0
-    found = np.zeros(len(boat.stations))
-    elevations(waves, boat, y, 12.0, found)
-    places = np.zeros((len(found), 3))
+    nothing = np.zeros((0, 3))
+    volume = Quadrature(boat.points, boat.volumes)
+    box = np.stack([boat.low, boat.high])
+    sea = make_sea(waves, volume, nothing, nothing, nothing, stations=boat.stations, box=box)
+    sums, size = passage(sea), len(boat.stations)
+    value, slope = np.zeros(sums.value.shape[1]), np.zeros(sums.value.shape[1])
+    evaluate(sea, y, 12.0, sums, value, slope)
+    places = np.zeros((size, 3))
     places[:, 0] = boat.stations
-    expected = kinematics(waves, y[6:9] + places @ rotation(*y[9:]).T, 12.0).elevation
-    assert found == pytest.approx(expected, abs=1e-12)
+    places = y[6:9] + places @ rotation(*y[9:]).T
+    assert value[-size:] == pytest.approx(
+        kinematics(waves, places, 12.0).elevation, abs=1e-12 if components == 1 else 1e-5
+    )
+    later, earlier = (kinematics(waves, places, 12.0 + h).elevation for h in (1e-4, -1e-4))
+    assert slope[-size:] == pytest.approx((later - earlier) / 2e-4, abs=1e-5)
+    y[8] = 60.0
+    evaluate(sea, y, 12.0, sums, value, slope)
+    assert (value[-size:] == 0.0).all()

@@ -18,8 +18,10 @@ from made_campaigns import CONSTANTS, STEADY, campaign, history
 
 from ident.campaign import read_campaign
 from ident.cli import main
+from ident.identify import identify
 from ident.quantities import factor, table
 from ident.readers.source import Source
+from ident.store import database_rows
 from sim.errors import InputError
 
 COLUMNS = ["X", "Y", "N"]
@@ -302,6 +304,39 @@ def test_constants_from_the_file_name(tmp_path):
 def test_files_that_are_not_there_are_named(tmp_path):
     with pytest.raises(InputError, match=r"no file 'runs\.csv'"):
         read_campaign(campaign(tmp_path, history("runs.csv")))
+
+
+def test_runs_outside_a_stated_range_stay_in_the_table_and_are_not_used(tmp_path):
+    within = "[source.within]\nbeta_deg = [-4.0, 4.0]\n"
+    runs = read(tmp_path / "a", PLAIN, tidy("", MAP) + within)
+    assert_values(runs)
+    # 4 deg is written with other digits than the limit in radians; it is inside.
+    assert runs["exclude"].map(bool).tolist() == [False, False, True]
+    assert set("XYN") <= set(runs["exclude"].iloc[2].split())
+    assert runs["reason"].iloc[2] == "beta_deg beyond -4 to 4"
+    # The same numbers as from a file without that run: it is no measure of size either.
+    found = identify(read_campaign(tmp_path / "a"))
+    read(tmp_path / "b", PLAIN.rsplit("\n", 2)[0] + "\n", tidy("", MAP))
+    without = identify(read_campaign(tmp_path / "b"))
+    pd.testing.assert_frame_equal(database_rows(found), database_rows(without))
+    assert {(name, reason) for name, _, _, _, reason in found.unused} >= {("runs-4", "beta_deg beyond -4 to 4")}
+
+
+@pytest.mark.parametrize(
+    ("within", "words"),
+    [
+        ("beta_deg = [4.0, -4.0]", "first below the second"),
+        ("beta_deg = [4.0]", "source.0.within.beta_deg"),
+        ("beta = [-4.0, 4.0]", "no state of a run with its unit"),
+        ("X_N = [-4.0, 4.0]", "no state of a run with its unit"),
+        ("r_radps = [-4.0, 4.0]", "no r in the runs"),
+    ],
+)
+def test_a_range_of_what_is_no_state_is_refused(tmp_path, within, words):
+    with pytest.raises(InputError) as caught:
+        read(tmp_path, PLAIN, tidy("", MAP) + f"[source.within]\n{within}\n")
+    assert words in str(caught.value)
+    assert "within" in str(caught.value)
 
 
 def test_examples_of_the_documentation_fit_the_schema():

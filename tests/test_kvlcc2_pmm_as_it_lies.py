@@ -1,61 +1,26 @@
 """Authority: published derivatives. HMRI's PMM campaign of the KVLCC2 tanker, read as it lies,
 against the MMG values of Yasukawa and Yoshimura (2015): ship sign of drift, primes on L^2,
 harmonics in phase and in quadrature, and loads that contain the model's own inertia.
+
+The instants of the oscillations one by one; ``test_published_kvlcc2.py`` fits the same
+campaign file, so that the two have one moment point.
 """
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
 import numpy as np
 import pytest
-from made_campaigns import campaign
 
 from ident.campaign import read_campaign
 
 DATA = Path(__file__).parents[2] / "shared" / "datasets"
 HMRI = DATA / "kvlcc2_hmri_pmm"
+OURS = Path(__file__).parent / "data" / "kvlcc2"
 LENGTH, DRAUGHT, DENSITY, SPEED = 6.893, 0.448, 1000.0, 1.1702
 pytestmark = pytest.mark.skipif(not HMRI.is_dir(), reason="the benchmark's data are not distributed with the program")
-
-CONSTANTS = """[source.constants]
-part = "hull"
-quality = "ok"
-source = "HMRI 2012, SIMMAN 2014"
-D0 = "0 m"
-rel_sigma = 0.05
-"""
-PMM = """[[source]]
-files = "{file}.csv"
-normalisation = "half_rho_L2"
-ignore = ["RX*", "RY*", "T_*", "RPS"]
-[source.columns]
-"Run No." = "run_id"
-Speed = "U [m/s]"
-"Freq." = "frequency [Hz]"
-{columns}
-{constants}alpha = "0 deg"
-beta = "0 deg"
-[source.reduction]
-kind = "oscillatory"
-motion = "{motion}"
-"""
-DRIFT = """[[source]]
-files = "static_drift_test.csv"
-normalisation = "half_rho_L2"
-ignore = ["RX*", "RY*", "TX*"]
-[source.columns]
-"Run No." = "run_id"
-beta = "beta [deg]"
-Speed = "U"
-rps = "n [rps]"
-{constants}alpha = "0 deg"
-test = "drift_horizontal"
-"""
-INERTIA = (
-    "model_inertia_in_loads = true\nmass_kg = 3123.0\ncentre_of_gravity_m = [0.0, 0.0, 0.0]\n"
-    'tensor_kgm2 = [300.0, 9516.0, 9516.0]\nsource = "channel definitions; G at the moment point is assumed"'
-)
 
 
 @pytest.fixture(scope="module")
@@ -70,13 +35,8 @@ def runs(tmp_path_factory):
     folder = tmp_path_factory.mktemp("hmri")
     for path in HMRI.glob("*_test.csv"):
         (folder / path.name).symlink_to(path)
-    sway = PMM.format(file="pure_sway_test", motion="sway", columns='vdot = "vdot [-]"', constants=CONSTANTS)
-    turns = 'r = "r [-]"\nrdot = "rdot [-]"'
-    yaw = PMM.format(file="pure_yaw_test", motion="yaw", columns=turns, constants=CONSTANTS)
-    frame = 'x = "forward"\ny = "starboard"\nz = "down"\nangles = "ittc"'
-    scale = f"ratio = 1.0\nlength_m = {LENGTH}\ndraught_m = {DRAUGHT}"
-    sources = sway + yaw + DRIFT.format(constants=CONSTANTS)
-    campaign(folder, sources, frame=frame, scale=scale, inertia=INERTIA)
+    for path in OURS.glob("*.toml"):
+        shutil.copy(path, folder)
     return read_campaign(folder).runs.set_index("run_id")
 
 

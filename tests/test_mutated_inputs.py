@@ -9,7 +9,9 @@ names a place. A few dozen examples a reader here; ``IDENT_MUTATIONS=10000`` for
 
 from __future__ import annotations
 
+import json
 import os
+import shutil
 import warnings
 from pathlib import Path
 
@@ -21,8 +23,10 @@ from hypothesis import strategies as st
 from made_campaigns import STEADY, campaign, history
 from test_files_of_each_format import MAP, PATTERNS, PLAIN, ROWS, STAR, tidy
 from test_openfoam_versions import PARTS, REAL, SOURCE, STATE, VERSIONS
+from test_quality_checks_from_a_campaign_folder import CONFIGURED, ship
 
 from ident.campaign import read_campaign
+from ident.checks import check_campaign
 from ident.identify import identify
 from ident.store import commit, database_rows
 from sim.catalogue import OUTPUTS
@@ -123,6 +127,38 @@ def survives(folder: Path, fit: bool = False) -> None:
         assert np.isfinite(rows[["value", "stderr"]].to_numpy()).all()
 
 
+@MUTATED
+@given(data=st.data())
+def test_damaged_campaigns_are_checked(tmp_path, data):
+    """Quality checks of whatever can be read: findings or a refusal, and no warning."""
+    folder = tmp_path / "ship"
+    if not folder.exists():
+        printed = "coefficient,value\nY_v,-0.021\nN_v,-0.009\nY_vdot,-0.0146\n"
+        ship(folder, 1.0, 'reference = "printed.csv"\nconfigurations = "named.csv"', printed)
+        (folder / "named.csv").write_text(CONFIGURED)
+        for path in folder.glob("*.csv"):
+            shutil.copy(path, tmp_path)
+    hit = data.draw(st.sampled_from(["runs.csv", "printed.csv", "named.csv"]))
+    for path in tmp_path.glob("*.csv"):
+        content = path.read_bytes()
+        (folder / path.name).write_bytes(
+            damaged(content, data.draw(damage(len(content)))) if path.name == hit else content
+        )
+    for one in checked_or_refused(folder):
+        assert one.what
+        json.dumps(one.as_json(), allow_nan=False)
+
+
+def checked_or_refused(folder: Path) -> list:
+    """Findings on a campaign; none where it is refused."""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", RuntimeWarning)
+            return check_campaign(read_campaign(folder), folder)
+    except InputError:
+        return []
+
+
 MONITORS = STAR[:6000].rsplit("\n", 1)[0].replace("(N-m)", "")
 CASES = {
     "tidy": (tidy("", MAP), "runs.csv", PLAIN.encode()),
@@ -183,12 +219,13 @@ def test_damaged_parquet(tmp_path, data):
 
 
 HEADER = SOURCE + "rho_inf = 1.0\nvehicle_origin = [0.5, 0.0, 0.0]\n" + PARTS + STATE + STEADY
+HEADER += "[source.within]\nbeta_deg = [-20.0, 20.0]\n"
 
 
 @MUTATED
 @given(data=st.data())
 def test_damaged_campaign_file(tmp_path, data):
-    campaign(tmp_path, HEADER)
+    campaign(tmp_path, HEADER, tables='reference = "printed.csv"')
     if not (tmp_path / "run").exists():
         (tmp_path / "run").symlink_to(REAL)
     path = tmp_path / "campaign.toml"
@@ -214,6 +251,16 @@ def test_a_refused_campaign_leaves_the_database_as_it_was(tmp_path):
         fit(tmp_path / "c", db)
     assert len(versions(db)) == 1
     pd.testing.assert_frame_equal(read_rows(db, vehicle="bb2")[0], read_rows(db, 0, "bb2")[0])
+
+
+@pytest.mark.parametrize("name", ["b2", "b2.toml"])
+def test_a_slip_in_the_name_of_the_vehicle_names_the_campaign_file(tmp_path, name):
+    """Found by damaging campaign files."""
+    campaign(tmp_path, tidy())
+    path = tmp_path / "campaign.toml"
+    path.write_text(path.read_text().replace('"bb2"', f'"{name}"'))
+    with pytest.raises(InputError, match=r"campaign\.toml, key vehicle: '.*b2.*: no such file"):
+        read_campaign(tmp_path)
 
 
 def test_folders_and_unreadable_files_are_refused(tmp_path):

@@ -25,13 +25,15 @@ SHEETS = ("static_drift_test.csv", "pure_sway_test.csv", "pure_yaw_test.csv")
 SLENDERNESS = 320.0 / 20.8
 # The MMG tests went to 20 deg of drift; a cubic does not hold to HMRI's 30 deg.
 LARGEST_DRIFT = 20.0
-LENGTH, MASS, YAW_INERTIA = 6.8927, 3123.0, 9516.0
+LENGTH, MASS, YAW_INERTIA, GRAVITY = 6.8927, 3123.0, 9516.0, 0.24
+# The print has three decimals.
+LAST_DIGIT = 0.0005
 
 pytestmark = pytest.mark.skipif(not HMRI.exists(), reason="reference data sets not beside the project")
 
 
-def _folder(where, edit=lambda text: text, drift=LARGEST_DRIFT, rewrite=lambda name, row: row):
-    """The campaign beside copies of HMRI's sheets, drift limited to the published range."""
+def _folder(where, edit=lambda text: text, rewrite=lambda name, row: row):
+    """The campaign beside copies of HMRI's sheets."""
     where.mkdir()
     for name in ("kvlcc2.toml", "campaign.toml"):
         text = (ROOT / "tests" / "data" / "kvlcc2" / name).read_text("utf-8")
@@ -39,8 +41,6 @@ def _folder(where, edit=lambda text: text, drift=LARGEST_DRIFT, rewrite=lambda n
     for name in SHEETS:
         with (HMRI / name).open(encoding="utf-8-sig", newline="") as stream:
             rows = list(csv.DictReader(stream))
-        if name == SHEETS[0]:
-            rows = [r for r in rows if abs(float(r["beta"])) <= drift]
         pd.DataFrame([rewrite(name, r) for r in rows]).to_csv(where / name, index=False)
     return where
 
@@ -62,10 +62,27 @@ def published():
         return {r["parameter"]: float(r["value"]) for r in csv.DictReader(stream)}
 
 
-def _score(found, published, name, symbol, sign=1.0):
-    """Difference in standard errors; the print has three decimals."""
+@pytest.fixture(scope="module")
+def hull(tmp_path_factory, published):
+    """The same with the rudder's load taken off: its measured force RY' and what it induces on the hull."""
+    induced, at = published["a_H"], published["x_H_dash"]
+    arm = -0.5 + induced * at - (1.0 + induced) * GRAVITY / LENGTH
+
+    def without_rudder(name, row):
+        row = dict(row)
+        for key in [k for k in row if k.startswith("RY")]:
+            force, kind = float(row[key]), key[2:]
+            row[f"Y{kind}"] = repr(float(row[f"Y{kind}"]) - (1.0 + induced) * force)
+            row[f"N{kind}"] = repr(float(row[f"N{kind}"]) - arm * force)
+        return row
+
+    return _fit(_folder(tmp_path_factory.mktemp("hmri") / "hull", rewrite=without_rudder))
+
+
+def _score(found, name, there):
+    """Difference in standard errors."""
     value, error = found[name]
-    return (sign * value - published[symbol]) / math.hypot(error, 0.0005)
+    return (value - there) / math.hypot(error, LAST_DIGIT)
 
 
 def test_fit_command_on_the_files_as_they_lie(tmp_path):
@@ -77,38 +94,63 @@ def test_fit_command_on_the_files_as_they_lie(tmp_path):
         shutil.copy(ROOT / "tests" / "data" / "kvlcc2" / name, folder)
     done = CliRunner().invoke(main, ["fit", str(folder), "--db", str(tmp_path / "db")])
     assert done.exit_code == 0, done.output
-    # 18 drift runs, four instants of each of 4 + 6 oscillations; the run at zero drift has no drift.
-    assert "57 of 58 runs used" in done.output
+    # 18 drift runs, four instants of each of 4 + 6 oscillations; four runs are beyond 20 deg and
+    # the run at zero drift has no drift.
+    assert "53 of 58 runs used" in done.output
+    assert "beyond -20 to 20" in done.output
     assert "committed version 0" in done.output
 
 
-@pytest.mark.parametrize("name", ["Y_v", "N_v", "Y_vvv", "Y_r", "N_r", "N_rrr"])
+@pytest.mark.parametrize("name", ["Y_v", "N_v", "Y_vvv", "N_r", "N_rrr"])
 def test_derivatives_agree_with_the_published_ones(found, published, name):
-    assert abs(_score(found, published, name, name)) < 2.0, found[name]
+    """As they lie, the rudder amidships included."""
+    assert abs(_score(found, name, published[name])) < 2.0, found[name]
 
 
-def test_added_mass_agrees_with_the_published_one(found, published):
-    """The model's own mass, 40 % of what was measured, is taken off."""
-    assert abs(_score(found, published, "Y_vdot", "m_y_dash", -1.0)) < 2.0, found["Y_vdot"]
-    assert found["Y_vdot"][1] < 0.1 * abs(found["Y_vdot"][0])
+@pytest.mark.parametrize("with_rudder", [True, False])
+def test_added_masses_agree_with_the_published_ones(found, hull, published, with_rudder):
+    """The model's own mass and inertia, more than half of what was measured, are taken off."""
+    ours = found if with_rudder else hull
+    for name, symbol in (("Y_vdot", "m_y_dash"), ("N_rdot", "J_z_dash")):
+        assert abs(_score(ours, name, -published[symbol])) < 2.0, (name, ours[name])
+        assert ours[name][1] < 0.15 * abs(ours[name][0])
 
 
-def test_added_inertia_agrees_within_three_standard_errors_only(found, published):
-    """A third of the measured moment is the water's: 10 % of it is 30 % of J_z."""
-    assert abs(_score(found, published, "N_rdot", "J_z_dash", -1.0)) < 3.0, found["N_rdot"]
+def test_yaw_of_the_hull_alone_agrees_with_the_published_one(found, hull, published):
+    """MMG writes m_x u r beside Y_r; measured loads have it inside: Y_r of a run is Y_r - m_x.
 
-
-def test_loads_over_the_published_drift_range(found, published):
-    """The cubic N_vvv is small and differs, so the moment itself is held against the published one.
-
-    HMRI's loads contain the rudder amidships, the MMG derivatives do not: in drift it gives
-    a moment of 15 % against the hull's.
+    With the rudder in it does not agree: in yaw the rudder gives a quarter of the force.
     """
-    v = -math.sin(math.radians(LARGEST_DRIFT))
-    for output, share in (("Y", 0.10), ("N", 0.20)):
-        here = found[f"{output}_v"][0] * v + found[f"{output}_vvv"][0] * v**3
-        there = published[f"{output}_v"] * v + published[f"{output}_vvv"] * v**3
-        assert here == pytest.approx(there, rel=share), output
+    whole = published["Y_r"] - published["m_x_dash"]
+    assert abs(_score(hull, "Y_r", whole)) < 2.0, hull["Y_r"]
+    assert abs(_score(found, "Y_r", whole)) > 2.0, found["Y_r"]
+    for name in ("Y_vvv", "Y_rrr", "N_rrr"):
+        assert abs(_score(hull, name, published[name])) < 2.0, (name, hull[name])
+
+
+def test_what_does_not_agree_and_by_how_much(found, hull, published):
+    """Not within the standard errors, whatever is done: two tanks, two models, one ship.
+
+    N_vvv differs in sign in every reading: with the rudder or without, about midship or the
+    centre of gravity, to 12 or 30 deg. HMRI's N/v falls by a seventh from 4 to 20 deg, the
+    published one is level. The hull alone, which is what MMG derivatives are of, has Y_v 14 %
+    smaller and N_v 13 % larger than printed, N_r 18 % smaller: that the two linear drift
+    derivatives agree with the rudder in is partly chance.
+    """
+    for ours in (found, hull):
+        assert ours["N_vvv"][0] > 0.1 > published["N_vvv"]
+        assert _score(ours, "N_vvv", published["N_vvv"]) > 4.0
+    for name, low, high in (("Y_v", 0.80, 0.90), ("N_v", 1.08, 1.18), ("N_r", 0.75, 0.90)):
+        assert low < hull[name][0] / published[name] < high, (name, hull[name])
+
+
+@pytest.mark.parametrize("degrees", [5.0, 10.0, 15.0, LARGEST_DRIFT])
+def test_moment_of_the_hull_over_the_published_drift_range(hull, published, degrees):
+    """The cubics differ, the moments they stand for by 13 % at most, by 7 % at 20 deg."""
+    v = -math.sin(math.radians(degrees))
+    here = hull["N_v"][0] * v + hull["N_vvv"][0] * v**3
+    there = published["N_v"] * v + published["N_vvv"] * v**3
+    assert here == pytest.approx(there, rel=0.07 if degrees == LARGEST_DRIFT else 0.13)
 
 
 def test_the_models_own_inertia_is_the_difference_it_makes(found, tmp_path):
@@ -126,17 +168,24 @@ def test_the_models_own_inertia_is_the_difference_it_makes(found, tmp_path):
     assert raw["Y_vdot"][1] == pytest.approx(found["Y_vdot"][1], rel=1e-6)
 
 
-def test_moment_point_is_where_added_mass_is_reciprocal(found, tmp_path):
-    """N_vdot = Y_rdot for any body: about the centre of gravity it nearly holds, about midship not."""
+def test_moment_point_is_where_added_mass_is_reciprocal(hull, published, tmp_path):
+    """N_vdot = Y_rdot for any hull, which the rudder's wake-delayed force is no part of.
+
+    Moments about a point x ahead of midship give N_vdot = N_vdot(0) + x Y_vdot(measured).
+    """
 
     def midship(text):
         return text.replace("x_m = 0.24", "x_m = 0.0")
 
+    error = math.hypot(hull["N_vdot"][1], hull["Y_rdot"][1])
+    gap = hull["N_vdot"][0] - hull["Y_rdot"][0]
+    assert abs(gap) < error
+    assert hull["N_vdot"][0] < 0.0
     there = _fit(_folder(tmp_path / "midship", midship))
-    gap = {k: abs(f["N_vdot"][0] - f["Y_rdot"][0]) for k, f in (("gravity", found), ("midship", there))}
-    assert gap["gravity"] < 0.5 * gap["midship"], gap
-    assert found["N_vdot"][0] < 0.0
-    assert found["Y_rdot"][0] < 0.0
+    step = there["N_vdot"][0] - _fit(_folder(tmp_path / "gravity"))["N_vdot"][0]
+    point = GRAVITY * (1.0 + gap / step)
+    assert point == pytest.approx(GRAVITY, abs=0.02)
+    assert abs(step) > 10.0 * error
 
 
 def test_mmg_norm_in_the_files_gives_the_same_coefficients(found, tmp_path):

@@ -15,7 +15,7 @@ import pytest
 from hmri import DATASETS, HMRI, KVLCC2, PMM, STATIC, needs_datasets, sheet
 
 from ident.checks import read_labels, run
-from ident.checks_tables import time_stamps
+from ident.checks_histories import time_stamps
 from ident.findings import Evidence, run_table
 
 

@@ -1,6 +1,7 @@
 """Write the data of docs/your-own-boat.md: ``python docs/example/make.py``.
 
-Captive loads come from known coefficients through the term table, with 2 % noise; the trial
+Captive loads come from known coefficients through the term table, with 2 % noise; some runs are
+written as the balance records them, with a start-up transient and correlated noise; the trial
 is the same boat flown with them, with noise. Nothing of the program under test is fitted here.
 """
 
@@ -40,6 +41,8 @@ TRUTH = {
 KT = {0.0: 0.45, 0.2: 0.38, 0.4: 0.30, 0.6: 0.21, 0.8: 0.12, 1.0: 0.02}
 KQ = {0.0: 0.060, 0.2: 0.052, 0.4: 0.043, 0.6: 0.033, 0.8: 0.022, 1.0: 0.010}
 DEDUCTION, WAKE = 0.18, 0.22
+# Of the pure sway run, as campaign.toml says them: [m], [Hz].
+SWAY = {"amplitude": 0.2, "frequency_hz": 0.15}
 
 
 def truth() -> Coefficients:
@@ -65,8 +68,8 @@ class Tank:
         self.vehicle = self.coefficients.vehicle
         self.noise = np.random.default_rng(7)
 
-    def loads(self, part: str, state: dict[str, float]) -> dict[str, str]:
-        """The loads that do not vanish [N, N m], model scale, in four digits."""
+    def exact(self, part: str, state: dict[str, float]) -> dict[str, float]:
+        """The loads X..N [N, N m] at model scale, without noise."""
         velocity = body_velocity(*(state.get(k, 0.0) for k in ("U", "alpha", "beta")))
         rates = [state.get(k, 0.0) for k in "pqr"]
         features = boat_features(velocity, rates, 40.0 / RATIO)
@@ -79,8 +82,12 @@ class Tank:
         for k in self.coefficients:
             if k.part == part and k.term.norm == "rho/2 L":
                 total[k.term.output] += k.term.scale(TANK, length, 1.0) * k.at([]) * multiplier(k.term, features)
+        return total
+
+    def loads(self, part: str, state: dict[str, float]) -> dict[str, str]:
+        """The loads that do not vanish [N, N m], with noise, in four digits."""
         unit = {o: "N" if o in "XYZ" else "Nm" for o in OUTPUTS}
-        noisy = {o: x * (1.0 + NOISE * float(self.noise.normal())) for o, x in total.items()}
+        noisy = {o: x * (1.0 + NOISE * float(self.noise.normal())) for o, x in self.exact(part, state).items()}
         return {f"{o}_{unit[o]}": f"{x:.4g}" for o, x in noisy.items() if x != 0.0}
 
     def write(self, name: str, test: str, part: str, states: list[dict[str, float]], columns: dict[str, Any]) -> None:
@@ -96,6 +103,7 @@ class Tank:
 
 def save(path: Path, header: list[str], table: list[dict[str, Any]]) -> None:
     """Write a CSV file."""
+    path.parent.mkdir(exist_ok=True)
     with path.open("w", encoding="utf-8", newline="") as stream:
         writer = csv.DictWriter(stream, header, restval="", lineterminator="\n")
         writer.writeheader()
@@ -134,6 +142,35 @@ def captive() -> None:
         )
     pushed = [base | {"U": 0.0, "pdot": x} for x in (-0.5, 0.5)]
     tank.write("acceleration_pdot", "acceleration", "hull", pushed, speed | {"pdot_radps2": ("pdot", 1.0)} | depth)
+
+
+def record(tank: Tank, name: str, states: list[dict[str, float]], time: np.ndarray) -> None:
+    """A history of X, Y, N on the hull: start-up transient (half the load, 3 s), noise of 5 % correlated over 0.5 s."""
+    loads = np.array([[tank.exact("hull", state)[o] for o in "XYN"] for state in states])
+    scatter, step = 0.05 * np.abs(loads).max(axis=0), float(time[1] - time[0])
+    memory = math.exp(-step / 0.5)
+    noise = np.zeros_like(loads)
+    noise[0] = scatter * tank.noise.normal(size=3)
+    for i in range(1, len(time)):
+        noise[i] = memory * noise[i - 1] + math.sqrt(1.0 - memory**2) * scatter * tank.noise.normal(size=3)
+    loads = loads * (1.0 - 0.5 * np.exp(-time / 3.0))[:, None] + noise
+    header = ["time_s", "X_N", "Y_N", "N_Nm"]
+    table = [dict(zip(header, [f"{t:.1f}", *(f"{x:.4g}" for x in row)])) for t, row in zip(time, loads)]
+    save(HERE / "captive" / "histories" / f"{name}.csv", header, table)
+
+
+def histories() -> None:
+    """Two steady drift runs and one pure sway run (displacement A sin wt) as the balance records them, at 10 Hz."""
+    tank, time = Tank(), np.arange(0.0, 40.0, 0.1)
+    for beta in (-10, 6):
+        steady = {"U": 1.5, "beta": math.radians(beta), "D0": 40.0 / RATIO}
+        record(tank, f"drift_{beta}", [steady] * time.size, time)
+    omega = 2.0 * math.pi * SWAY["frequency_hz"]
+    states = []
+    for t in time:
+        v, vdot = (SWAY["amplitude"] * x for x in (omega * math.cos(omega * t), -(omega**2) * math.sin(omega * t)))
+        states.append({"U": math.hypot(1.5, v), "beta": math.atan2(v, 1.5), "vdot": vdot, "D0": 40.0 / RATIO})
+    record(tank, "sway", states, time)
 
 
 def propeller() -> None:
@@ -183,5 +220,6 @@ def trial() -> None:
 
 if __name__ == "__main__":
     captive()
+    histories()
     propeller()
     trial()

@@ -21,6 +21,7 @@ MOTIONS = {
 }
 Vector = Annotated[list[float], Field(min_length=3, max_length=3)]
 Positive = Annotated[float, Field(gt=0, le=1e9)]
+Span = Annotated[list[float], Field(min_length=2, max_length=2)]
 
 
 class Reduction(Data):
@@ -59,7 +60,11 @@ class Reduction(Data):
 
 
 class Source(Data):
-    """Some files of a campaign that share a format; every key is in ``docs/readers.md``."""
+    """Some files of a campaign that share a format; every key is in ``docs/readers.md``.
+
+    ``within`` limits the states whose loads are used: ``beta_deg = [-20, 20]``. Runs outside
+    stay in the run table with all their loads excluded.
+    """
 
     files: Annotated[str, Field(min_length=1, max_length=300)]
     reader: Literal["table", "parquet", "starccm", "columns", "openfoam"] | None = None
@@ -75,6 +80,7 @@ class Source(Data):
     thousands: Literal["", ".", ",", "'", " "] = ""
     encoding: Literal["utf-8", "latin-1"] = "utf-8"
     constants: dict[str, str | float] = Field(default_factory=dict)
+    within: dict[str, Span] = Field(default_factory=dict)
     match: str = ""
     normalisation: str = ""
     parts: dict[str, str] = Field(default_factory=dict)
@@ -94,6 +100,14 @@ class Source(Data):
         for text in patterns:
             _compiled(text)
         return patterns
+
+    @field_validator("within")
+    @classmethod
+    def _spans_rise(cls, within: dict[str, list[float]]) -> dict[str, list[float]]:
+        for name, (low, high) in within.items():
+            if not low < high:
+                raise ValueError(f"{name} = [lowest, highest], the first below the second")
+        return within
 
     @model_validator(mode="after")
     def _reduction_fits(self) -> Source:

@@ -40,6 +40,7 @@ class Sheet:
     numbers : Wanted column positions -> blocks (rows, wanted) of finite numbers.
     cells : Blocks of (file row, cells as text), for a table of runs.
     dialect : How its numbers are written.
+    first_row : Row where the data begin.
     """
 
     path: Path
@@ -48,6 +49,7 @@ class Sheet:
     numbers: Callable[[list[int]], Iterator[Array]]
     cells: Callable[[], Iterator[tuple[int, list[str]]]]
     dialect: Dialect
+    first_row: int = 2
 
     @property
     def where(self) -> str:
@@ -89,7 +91,7 @@ def _text_sheet(path: Path, source: Source, dialect: Dialect, header: list[str],
                 yield row, found + [""] * (len(header) - len(found))
 
     _once(f"{path}, row {first.rows[0]} (header)", header)
-    return Sheet(path, first.rows[0], header, values, cells, dialect)
+    return Sheet(path, first.rows[0], header, values, cells, dialect, skip + 1)
 
 
 def open_csv(path: Path, source: Source) -> Sheet:

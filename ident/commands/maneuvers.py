@@ -1,0 +1,203 @@
+"""Commands that fly a version: validate, calibrate, stability."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from ident.commands.shared import DB, OUT, VERSION, console_for, emit
+
+
+@click.command()
+@click.option("--case", "case", default=None, help="Bundled case name, or path to a case file.")
+@click.option("--all", "every", is_flag=True, help="Fly every bundled case and print the scoreboard.")
+@click.option(
+    "--cases", type=click.Path(path_type=Path), default=None, help="With --all: a folder of your own cases too."
+)
+@DB
+@VERSION
+@OUT
+@click.option("--json", "json_path", default=None, metavar="PATH|-", help="Write the comparison as JSON.")
+@click.option("--strict", is_flag=True, help="Exit 1 when a tolerance of a case file is missed.")
+@click.option("--samples", type=click.IntRange(min=2), default=None, help="Draw so many coefficient sets; error bands.")
+@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Seed of the draws.")
+@click.option("--dask", default=None, metavar="ADDRESS", help="With --samples: fly them on a Dask cluster.")
+@click.option("--vehicle", default=None, help="With --case: bundled vehicle or vehicle file, not the case's.")
+@click.option(
+    "--reference",
+    type=click.Path(path_type=Path),
+    default=None,
+    help="With --case: your own reference, a CSV of source, channel, t or s, value, unit, and sigma if known.",
+)
+@click.option(
+    "--frame",
+    type=click.Choice(["source", "program"]),
+    default=None,
+    help="Frame of --reference: source is x aft, z up; program x forward, z down. The case's by default.",
+)
+def validate(
+    case: str | None,
+    every: bool,
+    cases: Path | None,
+    db: str,
+    version: int | None,
+    out: Path,
+    json_path: str | None,
+    strict: bool,
+    samples: int | None,
+    seed: int,
+    dask: str | None,
+    **own: Any,
+) -> None:
+    """Fly a maneuver from the database and compare it with its references.
+
+    \b
+    Example: ident validate --case hzz20 --json -
+             ident validate --case hzz20 --samples 1000
+             ident validate --case hzz20 --samples 100000 --dask tcp://scheduler:8786
+             ident validate --case turn20-4m --reference mine.csv --frame program
+             ident validate --case turning-circle --vehicle my_boat.toml
+             ident validate --all
+    """
+    from sim.errors import InputError
+    from sim.trim import NoEquilibrium
+
+    if (case is None) == (not every):
+        raise click.UsageError("give either --case NAME or --all")
+    if every and (samples or any(own.values())):
+        raise click.UsageError("--samples, --vehicle, --reference and --frame go with --case")
+    if dask and not samples:
+        raise click.UsageError("--dask goes with --samples")
+    if own["frame"] and not own["reference"]:
+        raise click.UsageError("--frame goes with --reference")
+    if out.exists() and not out.is_dir():
+        raise InputError(str(out), "a file", "a folder for the figures")
+    console = console_for(quiet=json_path == "-")
+    try:
+        done, result = _one(case, db, version, own, console) if case else _all(db, version, cases, console)
+    except NoEquilibrium as error:
+        raise InputError(f"case {case or 'of --all'}", str(error), "a state the boat can hold") from error
+    from ident.figures import case_figure
+
+    bands = _bands(done[0], result, samples, seed, dask, console) if samples else None
+    for one in done:
+        figure = case_figure(one, out / f"{one.case.name}_v{one.result['database']['version']}.png", bands)
+        console.print(f"figure: {figure}", highlight=False)
+    if json_path:
+        emit(result, json_path)
+    if strict and not all(one.result["passed"] for one in done):
+        raise click.exceptions.Exit(1)
+
+
+def _one(
+    case: str, db: str, version: int | None, own: dict[str, Any], console: Any
+) -> tuple[list[Any], dict[str, Any]]:
+    from ident.validate import show, validate
+
+    with console.status("flying the case (the first run on a machine compiles for half a minute)"):
+        done = validate(case, db, version, own["vehicle"], own["reference"], own["frame"])
+    show(done, console)
+    return [done], done.result
+
+
+def _bands(one: Any, result: dict[str, Any], samples: int, seed: int, dask: str | None, console: Any) -> Any:
+    """Fly the samples with a progress bar; adds ``bands`` to the result and prints it."""
+    from rich.progress import Progress
+
+    from ident.bands import fly_samples, show, summary
+
+    with Progress(console=console, transient=True) as progress:
+        task = progress.add_task("flying samples", total=samples)
+
+        def each(done: int) -> None:
+            progress.advance(task, done)
+
+        boat = one.boat
+        found = fly_samples(one.case, boat.vehicle, boat.rows, samples, seed, each=each, dask=dask)
+    result["bands"] = summary(found, one.case, one.reference)
+    show(result["bands"], console)
+    return found
+
+
+def _all(db: str, version: int | None, cases: Path | None, console: Any) -> tuple[list[Any], dict[str, Any]]:
+    from ident.scoreboard import run_all, show
+
+    with console.status("flying") as status:
+        board, done = run_all(db, version, cases, lambda name: status.update(f"flying {name}"))
+    show(board, console)
+    return done, board
+
+
+@click.command()
+@click.argument("name", default="bb2")
+@DB
+@VERSION
+@click.option("-m", "--message", default="", help="Message stored with the version.")
+@click.option("--left-out/--no-left-out", default=True, show_default=True, help="Repeat without each source in turn.")
+@click.option("--json", "json_path", default=None, metavar="PATH|-", help="Write priors, posteriors and diagnostics.")
+def calibrate(name: str, db: str, version: int | None, message: str, left_out: bool, json_path: str | None) -> None:
+    """Estimate multipliers of coefficient groups from free-running maneuvers.
+
+    NAME is a bundled calibration or a path to a file. Commits a new version whose parent is the
+    captive one it started from (the latest, or --version).
+
+    \b
+    Example: ident calibrate bb2
+             ident calibrate my_boat.toml --no-left-out --json -
+    """
+    from ident.calibrated import run, show
+
+    console = console_for(quiet=json_path == "-")
+    with console.status("calibrating") as status:
+        done = run(name, db, version, message, left_out, each=status.update)
+    show(done, console)
+    if json_path:
+        emit({**done.summary, "version": done.version, "new": done.new, "digest": done.digest}, json_path)
+
+
+@click.command()
+@DB
+@VERSION
+@click.option("--case", "case", default="hzz20", show_default=True, help="Case that gives vehicle and environment.")
+@click.option("--speed", "speeds", type=click.FloatRange(min=0, min_open=True), multiple=True, help="U [m/s]; repeat.")
+@click.option("--depth", "depths", type=float, multiple=True, help="D0 [m]; repeat.")
+@click.option("--json", "json_path", default=None, metavar="PATH|-", help="Write the results as JSON.")
+def stability(
+    db: str,
+    version: int | None,
+    case: str,
+    speeds: tuple[float, ...],
+    depths: tuple[float, ...],
+    json_path: str | None,
+) -> None:
+    """Stability indices, eigenvalues and critical speeds against speed and depth.
+
+    Without --speed and --depth, at the tabulated speeds and the depths of the drift runs.
+
+    \b
+    Example: ident stability --speed 3 --speed 5 --depth 25
+    """
+    from ident.stability import as_json, show
+    from ident.stability import stability as at
+    from sim.case import load_case
+    from sim.coefficients import Coefficients
+    from sim.database import read_rows
+    from sim.model import Environment
+    from sim.vehicle import load_vehicle
+
+    data, where = load_case(case)
+    vehicle = load_vehicle(data.vehicle, beside=where)
+    rows, number = read_rows(db, version, vehicle.name)
+    drift = rows[rows["output"].eq("N") & rows["beta_deg"].notna()]
+    speeds = speeds or tuple(sorted(drift["speed_mps"].dropna().unique())) or (data.initial.speed_mps,)
+    depths = depths or tuple(sorted(drift["depth_m"].dropna().unique())) or (data.initial.depth_m,)
+    environment = Environment(data.environment.density_kgpm3, data.environment.gravity_mps2)
+    coefficients = Coefficients(vehicle, rows)
+    console = console_for(quiet=json_path == "-")
+    with console.status("linearising"):
+        found = [at(coefficients, environment, u, d) for d in depths for u in speeds]
+    show(found, f"{vehicle.title}, database version {number}", console)
+    if json_path:
+        emit(as_json(found), json_path)

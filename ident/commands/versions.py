@@ -1,0 +1,108 @@
+"""Commands on the versions of a database: report, versions, diff, export."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from ident.commands.shared import DB, OUT, VERSION, console_for, emit
+
+
+@click.command()
+@DB
+@VERSION
+@click.option("--vehicle", default="bb2", show_default=True, help="Bundled vehicle name, or path to a vehicle file.")
+@OUT
+def report(db: str, version: int | None, vehicle: str, out: Path) -> None:
+    """Write one self-contained HTML page on a database version.
+
+    \b
+    Example: ident report --version 0
+    """
+    from ident.report import write_report
+
+    console = console_for()
+    with console.status("drawing every coefficient"):
+        path = write_report(db, version, out, vehicle)
+    console.print(f"report: {path}", highlight=False)
+
+
+@click.command()
+@DB
+@click.option("--json", "json_path", default=None, metavar="PATH|-", help="Write the list as JSON.")
+def versions(db: str, json_path: str | None) -> None:
+    """List the versions of a database.
+
+    \b
+    Example: ident versions --db coeff_db
+    """
+    from datetime import UTC, datetime
+
+    from rich.table import Table
+
+    from sim.database import versions as read
+
+    keys = ("vehicle", "campaign", "digest", "parent", "program", "message")
+    found = [
+        {
+            "version": v.number,
+            "time": datetime.fromtimestamp(int(v.timestamp) / 1000, UTC).isoformat(timespec="seconds"),
+            **{k: v.metadata.get(k, "") for k in keys},
+        }
+        for v in read(db)
+    ]
+    if json_path:
+        emit(found, json_path)
+    if json_path != "-":
+        table = Table(*found[0])
+        for row in found:
+            table.add_row(*[str(x)[:16] if k == "digest" else str(x) for k, x in row.items()])
+        console_for().print(table)
+
+
+@click.command()
+@click.argument("first", type=int)
+@click.argument("second", type=int)
+@DB
+@click.option("--json", "json_path", default=None, metavar="PATH|-", help="Write the differences as JSON.")
+def diff(first: int, second: int, db: str, json_path: str | None) -> None:
+    """Show what changed between two versions.
+
+    \b
+    Example: ident diff 0 1
+    """
+    from rich.table import Table
+
+    from ident.compare import difference
+
+    found = difference(db, first, second)
+    if json_path:
+        emit(found, json_path)
+    if json_path == "-":
+        return
+    if not found:
+        click.echo(f"versions {first} and {second} hold the same coefficients")
+        return
+    table = Table("coefficient", "added", "removed", "changed", "largest change", "in standard errors")
+    for row in found:
+        change = f"{100 * row['largest_relative_change']:.3g} %"
+        counts = [str(row[k]) for k in ("added", "removed", "changed")]
+        table.add_row(row["coefficient"], *counts, change, f"{row['largest_change_in_stderr']:.2f}")
+    console_for().print(table)
+
+
+@click.command()
+@click.argument("folder", type=click.Path(path_type=Path))
+@click.option("--format", "kind", type=click.Choice(["parquet", "csv", "json"]), default="csv", show_default=True)
+@DB
+@VERSION
+def export(folder: Path, kind: str, db: str, version: int | None) -> None:
+    """Write one version as a plain file into FOLDER.
+
+    \b
+    Example: ident export --version 0 --format csv exported/
+    """
+    from ident.compare import export as run
+
+    click.echo(str(run(db, version, kind, folder)))

@@ -1,0 +1,152 @@
+"""What surrounds a boat beside deep, calm water: waves and a surface it can come out of. Compiled.
+
+The right-hand side takes these as one more part of its scratch arrays; a boat in deep, calm
+water has an empty tuple there and is compiled without any of it.
+
+Where the hull is out of the water it loses buoyancy (``sim.emergence``), its share of the
+Froude-Krylov and mean loads, and the added mass of its emerged sections, on both sides of the
+equation of motion. Left out: the momentum of the added mass that changes (slamming), and the
+tables, which know the submerged boat only.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple, TypeAlias
+
+import numpy as np
+from numba import njit
+from numba.extending import overload
+from numpy.typing import NDArray
+
+from sim import wave_loads
+from sim.emergence import Cells, lost_buoyancy
+from sim.wave_loads import FORCE, WATER, WATER_RATE, Passage, Sea
+
+Array = NDArray[np.float64]
+
+
+class Surroundings(NamedTuple):
+    """Of one boat and thread.
+
+    sea, sums : Waves and the boat's points in them; a sea without components is calm.
+    cells : Of the hull, for emergence; without any the boat is taken as submerged.
+    added : (6, 6) added mass of the left-hand side. parts : (k + 1, 6, 6) what each section
+        has of it, then the rest. volume : (k,) volume of the cells of each section [m^3].
+    specific_weight : rho g [N/m^3].
+    clock : (2,) time at the start of the step, and now [s].
+    found : (n,) wave quantities now, in the layout of ``sim.wave_loads.at``.
+    felt : (12,) state with velocities relative to the water. lost : (6,) load of emergence
+        [N, N m]. dry : (k,) emerged volume by section [m^3]. wet : (6, 6) added mass of the wet
+        part. emerged : (1,) emerged share of the volume.
+    """
+
+    sea: Sea
+    sums: Passage
+    cells: Cells
+    added: Array
+    parts: Array
+    volume: Array
+    specific_weight: float
+    clock: Array
+    found: Array
+    felt: Array
+    lost: Array
+    dry: Array
+    wet: Array
+    emerged: Array
+
+
+# Surroundings, or an empty tuple in deep, calm water: the compiler tells them apart.
+Around: TypeAlias = Any
+
+
+@njit(cache=True, error_model="numpy")
+def _wet_added_mass(a: Surroundings, share: float) -> None:
+    """Added mass of the wet part of every section, into ``a.wet``."""
+    count = a.volume.size
+    a.wet[:] = (1.0 - share) * a.parts[count]
+    for k in range(count):
+        # A section that owns no cell comes out with the boat as a whole.
+        left = 1.0 - a.dry[k] / a.volume[k] if a.volume[k] > 0.0 else 1.0 - share
+        for i in range(6):
+            for j in range(6):
+                a.wet[i, j] += left * a.parts[k, i, j]
+
+
+def add_loads(around: Around, y: Array, out: Array) -> None:
+    """Add the loads of waves and emergence, X Y Z K M N body axes [N, N m], to ``out``."""
+    share = 0.0
+    if around.cells.volumes.size:
+        surface = around.found[around.found.size - around.cells.stations.size :]
+        share = lost_buoyancy(around.cells, y, surface, around.specific_weight, around.lost, around.dry)
+        for i in range(6):
+            out[i] += around.lost[i]
+        if share > 0.0:
+            _wet_added_mass(around, share)
+    around.emerged[0] = share
+    if around.sea.waves.amplitude.size:
+        added = around.wet if share > 0.0 else around.added
+        for i in range(6):
+            load = (1.0 - share) * around.found[FORCE + i]
+            for j in range(6):
+                load += added[i, j] * around.found[WATER_RATE + j]
+            out[i] += load
+
+
+def prepare(around: Around, y: Array, time: float) -> None:
+    """Make the surroundings ready for a step that starts at ``y`` [SI] and ``time`` [s]."""
+    around.clock[0] = around.clock[1] = time
+    if around.sea.waves.amplitude.size:
+        wave_loads.advance(around.sea, y, time, around.sums)
+
+
+def tick(around: Around, offset: float) -> None:
+    """Set the clock to the start of the step plus ``offset`` [s]."""
+    around.clock[1] = around.clock[0] + offset
+
+
+def observe(around: Around, y: Array) -> None:
+    """Wave quantities and relative velocities of state ``y`` at the time of the clock."""
+    for i in range(12):
+        around.felt[i] = y[i]
+    if around.sea.waves.amplitude.size:
+        wave_loads.at(around.sums, around.clock[1], around.found)
+        for i in range(6):
+            around.felt[i] -= around.found[WATER + i]
+
+
+# In deep, calm water none of this is compiled: the compiler chooses by the type of ``around``.
+def _calm_add_loads(around: Around, y: Array, out: Array) -> None:
+    pass
+
+
+def _calm_prepare(around: Around, y: Array, time: float) -> None:
+    pass
+
+
+def _calm_tick(around: Around, offset: float) -> None:
+    pass
+
+
+def _calm_observe(around: Around, y: Array) -> None:
+    pass
+
+
+@overload(add_loads)
+def _choose_add_loads(around: Around, y: Array, out: Array) -> object:
+    return add_loads if len(around) else _calm_add_loads
+
+
+@overload(prepare)
+def _choose_prepare(around: Around, y: Array, time: float) -> object:
+    return prepare if len(around) else _calm_prepare
+
+
+@overload(tick)
+def _choose_tick(around: Around, offset: float) -> object:
+    return tick if len(around) else _calm_tick
+
+
+@overload(observe)
+def _choose_observe(around: Around, y: Array) -> object:
+    return observe if len(around) else _calm_observe

@@ -1,0 +1,45 @@
+"""The command line's own rules: help is quick, every command shows an example, the wheel has all of it."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+from ident.cli import main
+
+ROOT = Path(__file__).parents[1]
+HEAVY = ("numpy", "pandas", "numba", "pydantic", "rich", "scipy", "matplotlib", "sim")
+
+
+@pytest.mark.parametrize("arguments", [["--help"], ["fit", "--help"], ["validate", "--help"]], ids=" ".join)
+def test_help_imports_nothing_heavy(arguments):
+    program = (
+        "import sys\nfrom ident.cli import main\n"
+        f"try:\n    main({arguments})\nexcept SystemExit as done:\n    assert not done.code\n"
+        f"print('loaded', [m for m in {HEAVY} if m in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, check=True)
+    assert "Example" in done.stdout or "ident fit" in done.stdout
+    assert done.stdout.splitlines()[-1] == "loaded []"
+
+
+def test_every_command_of_the_readme_is_there_with_an_example():
+    text = (ROOT / "README.md").read_text("utf-8")
+    assert len(main.commands) == 11
+    for name in main.commands:
+        shown = CliRunner().invoke(main, [name, "--help"])
+        assert shown.exit_code == 0
+        assert f"Example: ident {name}" in shown.output
+        assert f"ident {name}" in text, name
+
+
+def test_every_package_folder_is_in_the_wheel():
+    with (ROOT / "pyproject.toml").open("rb") as stream:
+        packages = tomllib.load(stream)["tool"]["setuptools"]["packages"]
+    folders = {p.parent for top in ("ident", "sim") for p in (ROOT / top).rglob("*.py")}
+    assert sorted(packages) == sorted(".".join(f.relative_to(ROOT).parts) for f in folders)
