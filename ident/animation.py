@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -52,9 +52,7 @@ def sampled(simulation: Simulation, frames: int, start: float | None = None, end
         raise InputError("animation, start and end", f"{first:g} and {last:g} s", allowed)
     at = np.linspace(first, last, frames)
     record = np.column_stack([np.interp(at, time, column) for column in simulation.record.T])
-    none = np.zeros((0, simulation.executes.shape[1]))
-    length, offset = simulation.length, simulation.depth_offset
-    return Simulation(simulation.columns, record, none, None, offset, length, simulation.steps, simulation.end)
+    return replace(simulation, record=record)
 
 
 @dataclass
@@ -363,5 +361,6 @@ def animate(
             str(path), f"cannot be written: {error.strerror or error}", "a path you may write to"
         ) from error
     finally:
-        part.unlink(missing_ok=True)
+        if part.exists():
+            part.unlink()
     return path

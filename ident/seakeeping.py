@@ -292,7 +292,7 @@ def _one(name: str, unit: str, c: int, fit: Fitted, encounter: Encounter, order:
 
 def harmonics(
     simulation: Simulation,
-    waves: Waves,
+    waves: Waves | None = None,
     channels: Sequence[str] = ("D0", "theta"),
     start: float = 0.0,
     drift: int = 1,
@@ -302,7 +302,7 @@ def harmonics(
     Parameters
     ----------
     simulation : The flight.
-    waves : The one regular wave it flew in.
+    waves : The one regular wave it flew in; that of the simulation when None.
     channels : Columns of the simulation.
     start : Time before which nothing is used [s]; of what is left, a start-up transient is
         cut off by the rule of ``ident.reduction``.
@@ -314,6 +314,9 @@ def harmonics(
         For a channel that is not there, water that is not one regular wave, or a record of
         too few periods or samples.
     """
+    waves = waves if waves is not None else simulation.waves
+    if waves is None:
+        raise InputError("harmonics in waves", "a flight in calm water", "one in a regular wave")
     known = (*simulation.columns, "U", "D0", "u_over_U0", "dz_over_L0")
     for name in channels:
         if name not in known or name == "t":

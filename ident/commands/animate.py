@@ -6,11 +6,13 @@ from pathlib import Path
 
 import click
 
+from ident.commands.shared import DB, VERSION, console_for, emit
+
 
 @click.command()
 @click.option("--case", "case", required=True, help="Bundled case name, or path to a case file.")
-@click.option("--db", default="coeff_db", show_default=True, help="Database folder or object-store URL.")
-@click.option("--version", "version", type=int, default=None, help="Database version; latest by default.")
+@DB
+@VERSION
 @click.option("--vehicle", default=None, help="Bundled vehicle or path to a vehicle file, instead of the case's.")
 @click.option("--out", type=click.Path(path_type=Path), default=None, help="File to write, .gif or .mp4; CASE.gif.")
 @click.option("--frames", type=click.IntRange(2, 2000), default=200, show_default=True, help="Number of pictures.")
@@ -62,18 +64,16 @@ def film(
     InputError
         As ``validate`` and ``animate``.
     """
-    from rich.console import Console
     from rich.progress import Progress
 
     from ident.animation import animate as draw
     from ident.animation import writer_of
-    from ident.cli import _emit
     from ident.validate import validate
     from sim.errors import InputError
     from sim.trim import NoEquilibrium
 
     frames, fps, start, end = pictures
-    console = Console(quiet=json_path == "-")
+    console = console_for(quiet=json_path == "-")
     if out is not None:
         writer_of(out, fps)
     try:
@@ -91,7 +91,7 @@ def film(
         draw(
             done.simulation,
             done.boat.vehicle,
-            None,
+            done.simulation.waves,
             path,
             frames=frames,
             fps=fps,
@@ -104,4 +104,4 @@ def film(
     console.print(f"animation: {path}, {frames} frames, {size / 1e6:.2g} MB", highlight=False)
     if json_path:
         shown = {"case": done.case.name, "database": database, "file": str(path), "frames": frames, "fps": fps}
-        _emit(shown | {"bytes": size}, json_path)
+        emit(shown | {"bytes": size}, json_path)
