@@ -59,14 +59,22 @@ def sampled(simulation: Simulation, frames: int, start: float | None = None, end
 class _Scene:
     """What is shown, and what moves: artists, and one function a panel that moves them.
 
-    The functions are called with the frame's number and say whether axes have moved too.
+    ``flight`` has one row a frame, ``record`` those of the simulation, for lines. The functions
+    are called with the frame's number and say whether axes have moved too.
     """
 
     flight: Simulation
+    record: Simulation
     boat: Silhouette
     waves: Waves | None
     update: list[Callable[[int], bool]] = field(default_factory=list)
     moving: list[Any] = field(default_factory=list)
+
+    def until(self, i: int, *channels: str) -> list[Array]:
+        """Channels of the whole record from the first frame to this one, its own value last."""
+        time, at = self.record["t"], self.flight["t"]
+        low, high = np.searchsorted(time, [at[0], at[i]])
+        return [np.append(self.record[c][low:high], self.flight[c][i]) for c in channels]
 
     def moves(self, artist: Any) -> Any:
         """Mark an artist as one that is drawn anew in every frame."""
@@ -164,7 +172,7 @@ def _plan_view(scene: _Scene, axis: Any) -> None:
     nose = scene.moves(axis.plot([], [], color="tab:red", lw=1.2, ls=":")[0])
 
     def update(i: int) -> bool:
-        track.set_data(x[: i + 1], y[: i + 1])
+        track.set_data(*scene.until(i, "x", "y"))
         heading, place = float(flight["psi"][i]), np.array([x[i], y[i]])
         for patch, outline in zip(parts, scene.boat.top, strict=True):
             patch.set_xy(place + enlarged * from_above(outline, heading))
@@ -199,18 +207,27 @@ def _wave_arrow(waves: Waves, axis: Any) -> None:
     _note(axis, 0.99, "arrow: where the waves travel to", "right")
 
 
+def _shown(scene: _Scene) -> NDArray[np.bool_]:
+    """Rows of the record that the film spans, those next to its ends included."""
+    time, at = scene.record["t"], scene.flight["t"]
+    step = float(np.diff(time).max())
+    return (time >= at[0] - step) & (time <= at[-1] + step)
+
+
 def _strip(scene: _Scene, axis: Any, channels: list[str], last: bool) -> None:
     """Channels over time up to now."""
-    flight, lines = scene.flight, []
+    flight, moving = scene.flight, []
     t = flight["t"]
     drawn = [readable(c, flight[c]) for c in channels]
     values = np.array([d[0] for d in drawn])
-    for k, (series, name, _) in enumerate(drawn):
+    # Limits from the record: between frames it may go further.
+    extent = np.concatenate([readable(c, scene.record[c][_shown(scene)])[0] for c in channels])
+    for k, (_, name, _) in enumerate(drawn):
         colour = _COLOURS[k % len(_COLOURS)] if len(drawn) > 1 else "tab:red"
-        lines.append((scene.moves(axis.plot([], [], color=colour, lw=1.2, label=name)[0]), series))
+        moving.append(scene.moves(axis.plot([], [], color=colour, lw=1.2, label=name)[0]))
     dots = scene.moves(axis.plot([], [], "o", color="k", ms=3)[0])
-    room = 0.08 * max(float(np.ptp(values)), 0.02 * float(np.abs(values).max()), 0.05)
-    axis.set(xlim=(t[0], t[-1]), ylim=(values.min() - room, values.max() + room))
+    room = 0.08 * max(float(np.ptp(extent)), 0.02 * float(np.abs(extent).max()), 0.05)
+    axis.set(xlim=(t[0], t[-1]), ylim=(extent.min() - room, extent.max() + room))
     if channels == ["D0"]:
         axis.invert_yaxis()
     title = f"{drawn[0][1]} [{drawn[0][2]}]" if len(drawn) == 1 else f"plane angles [{drawn[0][2]}]"
@@ -226,9 +243,10 @@ def _strip(scene: _Scene, axis: Any, channels: list[str], last: bool) -> None:
         )
 
     def update(i: int) -> bool:
-        for line, series in lines:
-            line.set_data(t[: i + 1], series[: i + 1])
-        dots.set_data(np.full(len(lines), t[i]), [series[i] for _, series in lines])
+        for line, channel in zip(moving, channels, strict=True):
+            now, series = scene.until(i, "t", channel)
+            line.set_data(now, readable(channel, series)[0])
+        dots.set_data(np.full(len(drawn), t[i]), values[:, i])
         return False
 
     scene.update.append(update)
@@ -339,7 +357,7 @@ def animate(
     from matplotlib.figure import Figure
 
     writer = writer_of(path, fps)
-    scene = _Scene(sampled(simulation, frames, start, end), silhouette(vehicle), waves)
+    scene = _Scene(sampled(simulation, frames, start, end), simulation, silhouette(vehicle), waves)
     planes = [p.name for p in vehicle.planes if p.name in simulation.columns]
     pictures = _pictures(scene, _figure(scene, planes, title, fps))
     part = path.with_name(f".{path.stem}.part{path.suffix}")

@@ -46,7 +46,7 @@ class Exceedance:
 def rice_rate(found: Statistics, level: float) -> float:
     """Crossings of a level a hour in one direction, of a Gaussian process (Rice 1944, 3.3-11).
 
-    sqrt(m2/m0)/(2 pi) exp(-(level - mean)^2 / (2 m0)), with m0 of the record and m2/m0 of its
+    sqrt(m2/m0)/(2 pi) exp(-(level - mean)^2 / (2 m0)), with m0 of the record and m2 of its
     spectrum. Of a narrow-band process it is also the rate of maxima beyond the level (Rayleigh).
     """
     away = (level - found.mean) / found.sigma

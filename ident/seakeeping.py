@@ -295,7 +295,7 @@ def harmonics(
     waves: Waves | None = None,
     channels: Sequence[str] = ("D0", "theta"),
     start: float = 0.0,
-    drift: int = 1,
+    drift: int = 3,
 ) -> dict[str, Harmonics]:
     """Harmonics 0-3 of channels of a flight in a regular wave.
 
@@ -306,7 +306,8 @@ def harmonics(
     channels : Columns of the simulation.
     start : Time before which nothing is used [s]; of what is left, a start-up transient is
         cut off by the rule of ``ident.reduction``.
-    drift : Order of the polynomial that takes up slow drift; 0 is none.
+    drift : Order of the polynomial that takes up slow drift; 0 is none. Drift that is left is in
+        the residuals and widens the standard errors.
 
     Raises
     ------
@@ -336,7 +337,7 @@ def _track(simulation: Simulation, use: NDArray[np.bool_]) -> Array:
 
 
 def harmonics_of(
-    time: Array, values: Array, channels: Mapping[str, str], waves: Waves, track: Array, drift: int = 1
+    time: Array, values: Array, channels: Mapping[str, str], waves: Waves, track: Array, drift: int = 3
 ) -> dict[str, Harmonics]:
     """As ``harmonics``, on arrays.
 

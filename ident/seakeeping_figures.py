@@ -29,8 +29,10 @@ _DOWNWARDS = ("z", "D0")
 # Levels drawn on an exceedance plot, and how far beyond the largest counted one.
 _LEVELS = 60
 _BEYOND = 4.5
+# Rates below this [1/h] are not drawn.
+_LEAST = 1e-6
 # Spectra are drawn up to where this share of the energy has passed.
-_ENERGY = 0.9995
+_ENERGY = 0.99
 _LABEL_OF = {
     "dz1_over_aw": r"depth: first harmonic over wave amplitude, $z_1/a_w$ [-]",
     "theta1": r"pitch: first harmonic $\theta_1$ [deg]",
@@ -77,7 +79,7 @@ def seaway_figure(
     found : Channel -> statistics, from ``seaway.statistics``.
     path : File to write; the suffix chooses the format.
     title : Case and vehicle. stamp : Database version.
-    level : Depth of the sail top that counts as broaching, drawn on D0 [m].
+    level : Depth of the sail top that counts as broaching, drawn on D0 when within 8 sigma [m].
 
     Returns
     -------
@@ -97,13 +99,21 @@ def seaway_figure(
         )
         if one.start > simulation["t"][0]:
             axis.axvspan(simulation["t"][0], one.start, color="k", alpha=0.08, lw=0, label="start-up, not used")
-        if level is not None and channel == "D0":
+        if level is not None and channel == "D0" and abs(level - one.mean) < 8.0 * one.sigma:
             axis.axhline(level, color="tab:blue", ls="--", lw=1.0, label=f"broaching: D0 < {level:g} m")
         _dress(axis, "", f"{name} [{unit}]")
         if channel in _DOWNWARDS:
             axis.invert_yaxis()
         # Above the axes, where no history can run through it.
-        axis.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=4, frameon=False, fontsize=8, borderaxespad=0.1)
+        axis.legend(
+            loc="lower left",
+            bbox_to_anchor=(0.0, 1.0),
+            ncols=5,
+            frameon=False,
+            fontsize=8,
+            borderaxespad=0.1,
+            columnspacing=1.2,
+        )
     axes[-1, 0].set_xlabel("time t [s]")
     return _finish(figure, path, title, stamp)
 
@@ -174,7 +184,7 @@ def exceedance_figure(
     sense = -1.0 if side == "below" else 1.0
     largest = float((sense * (found.trend + found.deviation - found.mean)).max())
     reach = max(_BEYOND * found.sigma, 1.05 * largest)
-    if level is not None:
+    if level is not None and rice_rate(found, level) > _LEAST:
         reach = max(reach, 1.05 * sense * (level - found.mean))
     levels = found.mean + sense * np.linspace(0.0, reach, _LEVELS)
     each = exceedances(found, list(levels), side)
@@ -205,9 +215,12 @@ def exceedance_figure(
     if level is not None:
         mark = float(readable(found.channel, np.array(level))[0])
         text = f"{mark:g} {unit}: Rice {rice_rate(found, level):.2g} a hour"
-        axis.axvline(mark, color="tab:green", ls="--", lw=1.0, label=text)
-    bottom = min(0.1 / hours, 0.3 * rice_rate(found, level)) if level is not None else 0.1 / hours
-    axis.set_ylim(max(bottom, 1e-6), 2.0 * rate.max())
+        # A level that is never reached is named only: it would squeeze all that is reached.
+        place = mark if rice_rate(found, level) > _LEAST else np.nan
+        axis.axvline(place, color="tab:green", ls="--", lw=1.0, label=text)
+    known = level is not None and rice_rate(found, level) > _LEAST
+    bottom = min(0.1 / hours, 0.3 * rice_rate(found, float(level or 0.0))) if known else 0.1 / hours
+    axis.set_ylim(max(bottom, _LEAST), 2.0 * rate.max())
     _dress(axis, f"level of {name} [{unit}]", f"crossings to {side} the level [1/h]")
     axis.legend(fontsize=8, frameon=False)
     return _finish(figure, path, title, stamp)

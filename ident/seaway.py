@@ -100,8 +100,14 @@ class Statistics:
 
     @property
     def rice_period(self) -> float:
-        """Mean zero-crossing period 2 pi sqrt(m0/m2) of a Gaussian process [s]."""
-        return 2.0 * math.pi * math.sqrt(float(self.moments[0] / self.moments[2]))
+        """Mean zero-crossing period 2 pi sigma / sqrt(m2) of a Gaussian process [s]."""
+        return 2.0 * math.pi * self.sigma / math.sqrt(float(self.moments[2]))
+
+    @property
+    def resolved(self) -> float:
+        """m0 of the spectrum over sigma^2: well below one, the boat moves more slowly than its
+        segments show, and a finer resolution is wanted."""
+        return float(self.moments[0]) / self.sigma**2
 
     @property
     def bandwidth(self) -> float:
@@ -112,7 +118,16 @@ class Statistics:
     def as_json(self) -> dict[str, Any]:
         """Plain numbers, without the series."""
         names = ["channel", "unit", "start", "end", "cut", "mean", "mean_stderr", "drift", "sigma", "sigma_stderr"]
-        names += ["significant", "third_highest", "waves", "period", "effective", "rice_period", "bandwidth"]
+        names += [
+            "significant",
+            "third_highest",
+            "waves",
+            "period",
+            "effective",
+            "rice_period",
+            "bandwidth",
+            "resolved",
+        ]
         moments = dict(zip(("m0", "m1", "m2", "m4"), self.moments.tolist(), strict=True))
         return (
             {n: getattr(self, n) for n in names}
