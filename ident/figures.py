@@ -64,6 +64,17 @@ def _shown(values: Array, unit: str) -> tuple[Array, str]:
     return values, unit
 
 
+def readable(channel: str, values: Array) -> tuple[Array, str, str]:
+    """A channel of a simulation for people: angles in degrees, and the name of its axis.
+
+    Returns
+    -------
+    values, name, unit.
+    """
+    shown, unit = _shown(values, _UNITS.get(channel, "rad"))
+    return shown, _LABELS.get(channel, channel.replace("_", " ")), unit
+
+
 def _sources(done: Validation) -> list[str]:
     reference = done.case.reference
     published = reference.published_model if reference else None
