@@ -61,7 +61,7 @@ class WavesData(Data):
     peak ``period_s``. ``direction_deg``: where the waves travel to, clockwise from north; a
     case starts along north, so 180 is a head sea. ``phase_deg`` of a regular wave: zero puts a
     crest at the earth origin at the start. ``spreading``: s of cos^2s of half the angle; zero
-    is long-crested.
+    is long-crested. ``second_order``: with mean drift forces and suction.
     """
 
     kind: Literal["regular", "bretschneider", "jonswap"]
@@ -73,6 +73,7 @@ class WavesData(Data):
     phase_deg: float = 0.0
     components: Annotated[int, Field(ge=1, le=5000)] = 200
     seed: Annotated[int, Field(ge=0)] = 1
+    second_order: bool = True
     spreading: Annotated[float, Field(ge=0)] = 0.0
     gamma: Annotated[float, Field(ge=1)] = 3.3
 

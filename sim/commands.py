@@ -108,13 +108,18 @@ class PlaneStep(Data):
 
 
 class PlaneCommand(Data):
-    """Law of dV or dH. Gains in degrees and metres, positive when they steer back."""
+    """Law of dV or dH. Gains in degrees and metres, positive when they steer back.
+
+    ``depth_from``: what dV and the tanks take for the depth: that below the calm surface, or
+    that of a pressure gauge at the body origin, which feels the waves.
+    """
 
     law: Literal["fixed", "pid", "zigzag", "programme"]
     value_deg: float = 0.0
     first_deg: float = 0.0
     check_deg: float = 0.0
     limit_deg: Positive = 30.0
+    depth_from: Literal["calm_surface", "pressure"] = "calm_surface"
     P_z: float = 0.0
     I_z: float = 0.0
     D_z: float = 0.0

@@ -17,8 +17,9 @@ from sim.mesh import Mesh
 from sim.pressure import Quadrature, quadrature
 from sim.surface import read_geometry
 from sim.surroundings import Surroundings
+from sim.wave_drift import Drift, make_drift
 from sim.wave_loads import Sea, make_sea, passage
-from sim.waves import Waves
+from sim.waves import Waves, make_waves
 
 if TYPE_CHECKING:
     from sim.coefficients import Coefficients
@@ -140,19 +141,27 @@ class Water:
     Attributes
     ----------
     sea : Waves and the boat's points in them; calm without components.
-    cells : Of the hull, for emergence.
+    cells : Of the hull, for emergence. drift : Mean second-order loads.
     centres, masses : (k, 3) sections that carry added mass [m], [kg].
     specific_weight : rho g [N/m^3].
     """
 
     sea: Sea
     cells: Cells
+    drift: Drift
     centres: Array
     masses: Array
     specific_weight: float
 
 
-def water_around(coefficients: Coefficients, environment: Environment, waves: Waves, span: float = 0.4) -> Water:
+def water_around(
+    coefficients: Coefficients,
+    environment: Environment,
+    waves: Waves,
+    span: float = 0.4,
+    top_speed: float = 0.0,
+    second_order: bool = True,
+) -> Water:
     """Waves, perhaps none, and the surface around a vehicle.
 
     Parameters
@@ -161,6 +170,8 @@ def water_around(coefficients: Coefficients, environment: Environment, waves: Wa
     environment : Water density and gravity.
     waves : Components.
     span : Time between sums of the waves [s].
+    top_speed : Largest speed ahead that is flown, for the mean second-order loads [m/s].
+    second_order : Whether there are mean second-order loads.
 
     Raises
     ------
@@ -174,7 +185,10 @@ def water_around(coefficients: Coefficients, environment: Environment, waves: Wa
     places = probes(vehicle) if waves.amplitude.size else np.zeros((0, 3))
     box = np.stack([hull.low, hull.high])
     sea = make_sea(waves, volume, centres, masses, places, span, stations=hull.stations, box=box)
-    return Water(sea, hull, centres, masses, environment.density * environment.gravity)
+    nothing = np.zeros(0)
+    calm = make_waves(nothing, nothing, nothing, nothing, waves.density, waves.gravity)
+    drift = make_drift(coefficients, environment, waves if second_order else calm, top_speed)
+    return Water(sea, hull, drift, centres, masses, environment.density * environment.gravity)
 
 
 def _root(matrix: Array, power: float) -> Array:
@@ -228,6 +242,7 @@ def surroundings(water: Water, model: Model) -> Surroundings:
         sea=water.sea,
         sums=sums,
         cells=water.cells,
+        drift=water.drift,
         added=np.ascontiguousarray(model.added_mass),
         parts=shares(model.added_mass, water.centres, water.masses),
         volume=volume,
@@ -236,6 +251,7 @@ def surroundings(water: Water, model: Model) -> Surroundings:
         found=np.zeros(sums.value.shape[1]),
         felt=np.zeros(12),
         lost=np.zeros(6),
+        mean=np.zeros(6),
         dry=np.zeros(count),
         wet=np.zeros((6, 6)),
         emerged=np.zeros(1),

@@ -15,7 +15,7 @@ from numba import njit
 
 from sim.events import HORIZONTAL, REVOLUTIONS, RUN, VERTICAL, Programme, Progress, advance, progress, step_past, watch
 from sim.kernel import Model, Work, rhs, rk4, workspace
-from sim.surroundings import Surroundings, prepare
+from sim.surroundings import Around, prepare, read_gauge
 
 FIXED, PID, ZIGZAG, PROGRAMME, YAW_RATE = 0, 1, 2, 3, 4
 N_COMMANDS, N_INTEGRALS = 5, 10
@@ -32,6 +32,7 @@ class Settings(NamedTuple):
     trim : (2,) command at the initial equilibrium [rad].
     gains : (2, 6) P I D on depth [rad/m] and pitch [rad/rad], and on sway and yaw.
     yaw_rate_gains : (6,) P I D of dH on the yaw rate [rad per rad/s], then zeros.
+    pressure_depth : Whether the depth is that of a pressure gauge, which feels waves.
     target : (4,) depth of the origin, pitch, earth y, heading.
     speed_law : ``FIXED``, ``PID`` or ``PROGRAMME``; speed_target [m/s], speed_gains P I D
         [rps per m/s].
@@ -48,6 +49,7 @@ class Settings(NamedTuple):
     gains: np.ndarray
     yaw_rate_gains: np.ndarray
     target: np.ndarray
+    pressure_depth: bool
     speed_law: int
     speed_target: float
     speed_gains: np.ndarray
@@ -292,6 +294,7 @@ def run(
     (rows recorded, executes recorded, rows of the log, time at the end [s]).
     """
     dy, stages, trial = np.zeros(12), np.zeros((6, 12)), np.zeros(12)
+    read, change = np.zeros(12), np.zeros(12)
     rate, command, integrals = np.zeros(c.size), np.zeros(N_COMMANDS), np.zeros(N_INTEGRALS)
     rows, events, logged, ends = 0, 0, 0, False
     programmed = s.programme.events.shape[0] > 0
@@ -304,7 +307,10 @@ def run(
         rhs(m, y, c, work, dy)
         if programmed:
             watch(s.programme, state, y, dy, step * dt)
-        autopilot(s, y, dy, state, integrals, dt, command)
+        read[:], change[:] = y, dy
+        if s.pressure_depth:
+            read_gauge(work.around, read, change)
+        autopilot(s, read, change, state, integrals, dt, command)
         if step % every == 0 and rows < record.shape[0]:
             record[rows, 0] = step * dt
             record[rows, 1:13] = y
@@ -369,7 +375,7 @@ def fly_logged(
     dt: float,
     steps: int,
     every: int,
-    around: tuple[()] | Surroundings = (),
+    around: Around = (),
 ) -> Flown:
     """``run`` with its arrays allocated, in calm, deep water or what is ``around``."""
     record = np.zeros((steps // every + 1, 15 + c0.size))

@@ -24,6 +24,8 @@ from sim.waves import Waves, make_waves, regular
 Array = NDArray[np.float64]
 # Time between sums of the waves [s], or the step if that is longer.
 _SPAN = 0.4
+# Speeds up to this many times the initial one have mean wave loads of their own.
+_FASTER = 1.25
 _STATES = ("u", "v", "w", "p", "q", "r", "x", "y", "z", "phi", "theta", "psi")
 
 # Channels a reference may hold, with the unit of the simulation.
@@ -183,6 +185,7 @@ def settings_of(case: Case, vehicle: Vehicle, state: Array, controls: Array, tri
         gains=np.array([dv.gains("z", "theta"), dh.gains("y", "psi")]),
         yaw_rate_gains=np.array([dh.P_r, dh.I_r, dh.D_r, 0.0, 0.0, 0.0]),
         target=np.array([state[8], state[10], state[7], state[11]]),
+        pressure_depth=dv.depth_from == "pressure",
         speed_law=law_code(n.law),
         speed_target=float(state[0]),
         speed_gains=np.array([n.P_u, n.I_u, n.D_u]),
@@ -296,7 +299,9 @@ def water_of(case: Case, coefficients: Coefficients) -> Water | None:
     if not case.environment.free_surface and waves.amplitude.size == 0:
         return None
     dt = case.run.step_s
-    return water_around(coefficients, environment_of(case), waves, dt * max(1, round(_SPAN / dt)))
+    span, fast = dt * max(1, round(_SPAN / dt)), _FASTER * case.initial.speed_mps
+    second_order = case.waves is not None and case.waves.second_order
+    return water_around(coefficients, environment_of(case), waves, span, fast, second_order)
 
 
 def environment_of(case: Case) -> Environment:

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from sim import wave_loads
 from sim.emergence import Cells, lost_buoyancy
+from sim.wave_drift import Drift, add_mean
 from sim.wave_loads import FORCE, WATER, WATER_RATE, Passage, Sea
 
 Array = NDArray[np.float64]
@@ -30,6 +31,7 @@ class Surroundings(NamedTuple):
 
     sea, sums : Waves and the boat's points in them; a sea without components is calm.
     cells : Of the hull, for emergence; without any the boat is taken as submerged.
+    drift : Mean second-order loads of the waves.
     added : (6, 6) added mass of the left-hand side. parts : (k + 1, 6, 6) what each section
         has of it, then the rest. volume : (k,) volume of the cells of each section [m^3].
     specific_weight : rho g [N/m^3].
@@ -37,12 +39,13 @@ class Surroundings(NamedTuple):
     found : (n,) wave quantities now, in the layout of ``sim.wave_loads.at``.
     felt : (12,) state with velocities relative to the water. lost : (6,) load of emergence
         [N, N m]. dry : (k,) emerged volume by section [m^3]. wet : (6, 6) added mass of the wet
-        part. emerged : (1,) emerged share of the volume.
+        part. mean : (6,) second-order loads [N, N m]. emerged : (1,) emerged share of the volume.
     """
 
     sea: Sea
     sums: Passage
     cells: Cells
+    drift: Drift
     added: Array
     parts: Array
     volume: Array
@@ -53,6 +56,7 @@ class Surroundings(NamedTuple):
     lost: Array
     dry: Array
     wet: Array
+    mean: Array
     emerged: Array
 
 
@@ -86,8 +90,10 @@ def add_loads(around: Around, y: Array, out: Array) -> None:
     around.emerged[0] = share
     if around.sea.waves.amplitude.size:
         added = around.wet if share > 0.0 else around.added
+        around.mean[:] = 0.0
+        add_mean(around.drift, y, around.mean)
         for i in range(6):
-            load = (1.0 - share) * around.found[FORCE + i]
+            load = (1.0 - share) * (around.found[FORCE + i] + around.mean[i])
             for j in range(6):
                 load += added[i, j] * around.found[WATER_RATE + j]
             out[i] += load
@@ -115,6 +121,20 @@ def observe(around: Around, y: Array) -> None:
             around.felt[i] -= around.found[WATER + i]
 
 
+def read_gauge(around: Around, state: Array, rate: Array) -> None:
+    """Change depth and its rate to what the boat's depth gauge reads in the pressure of the waves.
+
+    Parameters
+    ----------
+    around : After ``prepare``.
+    state, rate : (12,) of the boat at the time of the clock; entry 8 is changed.
+    """
+    if around.sea.waves.amplitude.size:
+        head, change = wave_loads.gauge(around.sea, around.sums, around.clock[1])
+        state[8] += head
+        rate[8] += change
+
+
 # In deep, calm water none of this is compiled: the compiler chooses by the type of ``around``.
 def _calm_add_loads(around: Around, y: Array, out: Array) -> None:
     pass
@@ -130,6 +150,15 @@ def _calm_tick(around: Around, offset: float) -> None:
 
 def _calm_observe(around: Around, y: Array) -> None:
     pass
+
+
+def _calm_read_gauge(around: Around, state: Array, rate: Array) -> None:
+    pass
+
+
+@overload(read_gauge)
+def _choose_read_gauge(around: Around, state: Array, rate: Array) -> object:
+    return read_gauge if len(around) else _calm_read_gauge
 
 
 @overload(add_loads)

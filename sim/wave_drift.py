@@ -16,11 +16,11 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from sim.mean_loads import DipoleBody, dipole_body, mean_loads
 from sim.waves import Waves
 
 if TYPE_CHECKING:
     from sim.coefficients import Coefficients
+    from sim.mean_loads import DipoleBody
     from sim.model import Environment
 
 Array = NDArray[np.float64]
@@ -72,6 +72,9 @@ def make_drift(
     """
     if waves.amplitude.size == 0:
         return Drift(np.zeros((0, 0, 0, 6)), 1.0, 1.0, 1.0)
+    # Only the set-up needs it, and it needs the model, which is compiled with this table.
+    from sim.mean_loads import dipole_body
+
     body = dipole_body(coefficients, environment, free)
     least = -coefficients.vehicle.particulars.sail_top.value[2]
     return tabulate(body, waves, least, top_speed)
@@ -103,6 +106,8 @@ def tabulate(body: DipoleBody, waves: Waves, least: float, top_speed: float = 0.
     top_speed : As for ``make_drift`` [m/s].
     """
     from scipy.interpolate import CubicSpline
+
+    from sim.mean_loads import mean_loads
 
     speeds = np.linspace(0.0, top_speed, _SPEEDS) if top_speed > 0.0 else np.zeros(1)
     decay, share = 2.0 * waves.number.min(), np.linspace(0.0, 1.0, _DEPTHS)

@@ -38,7 +38,8 @@ from sim.waves import Waves
 Array = NDArray[np.float64]
 Single = NDArray[np.float32]
 
-# Layout of the vector of wave quantities: then three velocities a probe, one elevation a station.
+# Layout of the vector of wave quantities: then three velocities a probe, the head of the wave's
+# pressure at the depth gauge, one elevation a station.
 FORCE, IMPULSE, WATER, PROBES = 0, 6, 12, 18
 # What ``at`` puts in the place of IMPULSE.
 WATER_RATE = IMPULSE
@@ -54,8 +55,8 @@ class Sea(NamedTuple):
 
     waves : Components; a sea without components is calm and must not be evaluated.
     single : (6, n) k, k cos chi, k sin chi, omega, cos chi, sin chi in single precision.
-    points : (v + s + p + e, 3) volume points, section centres, probes, stations over which the
-        elevation is wanted, in the body frame [m].
+    points : (v + s + p + 1 + e, 3) volume points, section centres, probes, the depth gauge,
+        stations over which the elevation is wanted, in the body frame [m].
     masses : (v,) rho V of the volume points [kg].
     sections : (s, 3) c m in x, y, z of the sections [kg].
     compliance : (6, 6) inverse of the added mass; zero where there is none.
@@ -140,12 +141,13 @@ def make_sea(
         added += motion.T @ (m[:, None] * motion)
     along = np.zeros(0) if stations is None else np.asarray(stations, dtype=float)
     over = np.column_stack([along, np.zeros((along.size, 2))])
+    gauge = np.zeros((1, 3))
     k, w, a = waves.number, waves.frequency, waves.amplitude
     single = np.stack([k, k * waves.north, k * waves.east, w, waves.north, waves.east])
     return Sea(
         waves,
         np.ascontiguousarray(single, dtype=np.float32),
-        np.concatenate([volume.points, centres, probes, over]),
+        np.concatenate([volume.points, centres, probes, gauge, over]),
         waves.density * volume.volumes,
         masses,
         np.asarray(np.linalg.pinv(added, rcond=1e-12, hermitian=True), dtype=float),
@@ -160,7 +162,8 @@ def make_sea(
 def passage(sea: Sea) -> Passage:
     """Empty sums for one thread."""
     n, points = sea.waves.amplitude.size, len(sea.points)
-    width = PROBES + 3 * (points - len(sea.masses) - len(sea.sections) - sea.stations) + sea.stations
+    felt = 1 + sea.stations
+    width = PROBES + 3 * (points - len(sea.masses) - len(sea.sections) - felt) + felt
     return Passage(
         time=np.array([0.0, -1.0]),
         value=np.zeros((2, width)),
@@ -184,7 +187,7 @@ def _place(sea: Sea, y: Array, time: float, pas: Passage) -> None:
     """Points and their velocities from the shallowest one, in earth axes; phases and sizes there."""
     m, w = pas.matrix, sea.waves
     fill_rotation(y[9], y[10], y[11], m)
-    top = np.inf
+    top, gauge = np.inf, sea.points.shape[0] - sea.stations - 1
     for i in range(sea.points.shape[0]):
         a, b, c = sea.points[i, 0], sea.points[i, 1], sea.points[i, 2]
         u = y[0] + y[4] * c - y[5] * b
@@ -195,11 +198,11 @@ def _place(sea: Sea, y: Array, time: float, pas: Passage) -> None:
             pas.motion[i, k] = m[k, 0] * u + m[k, 1] * v + m[k, 2] * d
         # Above the calm surface the waves keep the values they have there.
         pas.place[i, 2] = max(y[8] + pas.place[i, 2], 0.0)
-        if i < sea.points.shape[0] - sea.stations:
+        if i < gauge:
             top = min(top, pas.place[i, 2])
-    for i in range(sea.points.shape[0]):
+    for i in range(gauge):
         pas.place[i, 2] -= top
-    for i in range(sea.points.shape[0] - sea.stations, sea.points.shape[0]):
+    for i in range(gauge + 1, sea.points.shape[0]):
         pas.place[i, 2] = pas.motion[i, 2] = 0.0
     for j in range(w.amplitude.size):
         angle = w.number[j] * (w.north[j] * y[6] + w.east[j] * y[7]) - w.frequency[j] * time + w.phase[j]
@@ -259,24 +262,25 @@ def evaluate(sea: Sea, y: Array, time: float, pas: Passage, value: Array, slope:
     pas : Scratch arrays.
     value, slope : (n,) results, body axes about the body origin: FORCE Froude-Krylov load
         [N, N m], IMPULSE [kg m/s, kg m^2/s], WATER u v w p q r [m/s, rad/s], PROBES three
-        velocities each [m/s], elevation over each station [m, up], zero where no crest comes
-        near the boat; and their rates. The rate of IMPULSE is the added-mass load.
+        velocities each [m/s], head of the wave's pressure at the gauge [m], elevation over each
+        station [m, up], zero where no crest comes near the boat; and their rates. The rate of
+        IMPULSE is the added-mass load.
     """
     _place(sea, y, time, pas)
     sums, body, many = pas.sums, pas.body, sea.waves.amplitude.size >= MANY
     n, s = sea.masses.size, sea.sections.shape[0]
-    submerged = sea.points.shape[0] - sea.stations
+    gauge = sea.points.shape[0] - sea.stations - 1
     for i in range(value.size):
         value[i] = slope[i] = 0.0
-    for i in range(sea.points.shape[0] if _near(sea, y, pas.matrix) else submerged):
-        kind = 0 if i < n else (1 if i < submerged else 2)
+    for i in range(sea.points.shape[0] if _near(sea, y, pas.matrix) else gauge + 1):
+        kind = 0 if i < n else (1 if i < gauge else 2)
         if many:
             sum_many(sea.single, pas.single_size, pas.single_phase, kind, pas.place, pas.motion, i, sums)
         else:
             sum_few(sea.waves, pas.size, pas.phase, kind, pas.place, pas.motion, i, sums)
-        if i >= submerged:
-            value[PROBES + 3 * (submerged - n - s) + i - submerged] = sums[2]
-            slope[PROBES + 3 * (submerged - n - s) + i - submerged] = sums[5]
+        if i >= gauge:
+            value[PROBES + 3 * (gauge - n - s) + i - gauge] = sums[2]
+            slope[PROBES + 3 * (gauge - n - s) + i - gauge] = sums[5]
             continue
         _to_body(sums, pas.matrix, y, body)
         if i < n:
@@ -372,7 +376,7 @@ def at(pas: Passage, time: float, out: Array) -> None:
     time : [s].
     out : (n,) FORCE Froude-Krylov load [N, N m]; WATER_RATE rate of the water's u v w p q r
         along the motion [m/s^2, rad/s^2], which times the added mass is the added-mass load;
-        WATER; PROBES; elevations.
+        WATER; PROBES; gauge; elevations.
     """
     h = pas.time[1] - pas.time[0]
     t = (time - pas.time[0]) / h
@@ -384,3 +388,24 @@ def at(pas: Passage, time: float, out: Array) -> None:
     for i in range(6):
         k = WATER + i
         out[WATER_RATE + i] = e * (pas.value[1, k] - pas.value[0, k]) + f * pas.slope[0, k] + g * pas.slope[1, k]
+
+
+@njit(cache=True, error_model="numpy")
+def gauge(sea: Sea, pas: Passage, time: float) -> tuple[float, float]:
+    """Head of the waves' pressure at the body origin and its rate along the motion.
+
+    Parameters
+    ----------
+    sea, pas : After ``advance``.
+    time : [s].
+
+    Returns
+    -------
+    p / (rho g) [m] and its rate [m/s]: what a depth gauge reads beside the depth.
+    """
+    i, h = pas.value.shape[1] - sea.stations - 1, pas.time[1] - pas.time[0]
+    t = (time - pas.time[0]) / h
+    p, q, r, s = pas.value[0, i], pas.value[1, i], h * pas.slope[0, i], h * pas.slope[1, i]
+    value = p + t * (r + t * (3.0 * (q - p) - 2.0 * r - s + t * (2.0 * (p - q) + r + s)))
+    rate = r + t * (2.0 * (3.0 * (q - p) - 2.0 * r - s) + 3.0 * t * (2.0 * (p - q) + r + s))
+    return value, rate / h
