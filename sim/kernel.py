@@ -463,23 +463,16 @@ def rk4(
     h : Step [s].
     stages : (6, 12) scratch; row 5 also carries the controls, so at most 12 of them.
     """
-    k1, k2, k3, k4, z, moved = stages[0], stages[1], stages[2], stages[3], stages[4], stages[5]
-    tick(work.around, 0.0)
-    rhs(m, y, c, work, k1)
-    tick(work.around, 0.5 * h)
-    for i in range(c.size):
-        moved[i] = c[i] + 0.5 * h * rate[i]
-    for i in range(12):
-        z[i] = y[i] + 0.5 * h * k1[i]
-    rhs(m, z, moved, work, k2)
-    for i in range(12):
-        z[i] = y[i] + 0.5 * h * k2[i]
-    rhs(m, z, moved, work, k3)
-    for i in range(c.size):
-        moved[i] = c[i] + h * rate[i]
-    for i in range(12):
-        z[i] = y[i] + h * k3[i]
-    tick(work.around, h)
-    rhs(m, z, moved, work, k4)
+    z, moved = stages[4], stages[5]
+    # One call in a loop: four would be inlined four times, which takes minutes to compile in waves.
+    for stage in range(4):
+        ahead = h if stage == 3 else (0.5 * h if stage else 0.0)
+        for i in range(c.size):
+            moved[i] = c[i] + ahead * rate[i]
+        for i in range(12):
+            z[i] = y[i] + ahead * stages[stage - 1, i] if stage else y[i]
+        tick(work.around, ahead)
+        rhs(m, z, moved, work, stages[stage])
+    k1, k2, k3, k4 = stages[0], stages[1], stages[2], stages[3]
     for i in range(12):
         out[i] = y[i] + h / 6.0 * (k1[i] + 2.0 * k2[i] + 2.0 * k3[i] + k4[i])
