@@ -7,7 +7,7 @@ from typing import Any
 import click
 
 from ident import __version__
-from ident.commands import campaigns, maneuvers, versions
+from ident.commands import animate, campaigns, maneuvers, versions
 
 
 class Commands(click.Group):
@@ -47,7 +47,7 @@ def main() -> None:
     """
 
 
-for _module in (campaigns, maneuvers, versions):
+for _module in (campaigns, maneuvers, animate, versions):
     for _command in vars(_module).values():
         if isinstance(_command, click.Command):
             main.add_command(_command)

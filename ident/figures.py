@@ -52,6 +52,8 @@ _SHOWN = {
     "depth_change": ("dV", "theta", "D0", "U"),
     "course_keeping": ("dH", "psi", "y", "r"),
     "rise": ("theta", "q", "D0", "u_over_U0"),
+    "regular_waves": ("D0", "theta", "u", "dV"),
+    "irregular_waves": ("D0", "theta", "phi", "ballast"),
     "self_propulsion": ("n", "theta", "D0", "ballast"),
 }
 _DEFAULT = ("psi", "theta", "phi", "u", "D0", "r")

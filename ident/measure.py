@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from ident import turning, vertical
+from ident import sea_cases, turning, vertical
 from ident.metrics import roll_decay, zigzag
 from sim.case import Case, Series, in_radians
 from sim.simulate import Simulation
@@ -89,6 +89,10 @@ def _flown_only(case: Case, simulation: Simulation) -> tuple[Metrics, list[dict[
         return vertical.depth_change(channels, case.command.dV.step[-1].distance_m), None
     if kind == "course_keeping":
         return vertical.course_keeping(channels, _first_step_end(simulation, _HORIZONTAL)), None
+    if kind == "regular_waves":
+        return sea_cases.regular_waves(simulation), None
+    if kind == "irregular_waves":
+        return sea_cases.irregular_waves(simulation), None
     if kind == "rise":
         return vertical.rise(channels, _surfaced(case, simulation)), None
     return {}, None
@@ -130,6 +134,8 @@ def measured(
     columns: dict[str, Metrics]
     if case.maneuver == "turning_circle":
         columns = {label: turning.turning_circle(channels_of(flight)) for label, flight in flights.items()}
+        for label, flight in flights.items() if case.waves else ():
+            columns[label] |= sea_cases.turn_drift(flight)
         for source in _sources(case):
             channels = reference_channels(reference, source)
             if {"x", "y"} <= set(channels):

@@ -85,10 +85,23 @@ def validate(
     for one in done:
         figure = case_figure(one, out / f"{one.case.name}_v{one.result['database']['version']}.png", bands)
         console.print(f"figure: {figure}", highlight=False)
+    for figure in _sea_figures(done, out):
+        console.print(f"figure: {figure}", highlight=False)
     if json_path:
         emit(result, json_path)
     if strict and not all(one.result["passed"] for one in done):
         raise click.exceptions.Exit(1)
+
+
+def _sea_figures(done: list[Any], out: Path) -> list[Path]:
+    """Further figures of cases in waves."""
+    if not any(one.case.waves for one in done):
+        return []
+    from ident.sea_cases import harmonics_over_depth, sea_figures
+
+    found = [figure for one in done for figure in sea_figures(one, out)]
+    over_depth = harmonics_over_depth(done, out)
+    return [*found, over_depth] if over_depth else found
 
 
 def _one(
