@@ -109,7 +109,7 @@ def _one(
 ) -> tuple[list[Any], dict[str, Any]]:
     from ident.validate import show, validate
 
-    with console.status("flying the case (the first run on a machine compiles for half a minute)"):
+    with console.status("flying the case (the first run on a machine compiles: half a minute, in waves two)"):
         done = validate(case, db, version, own["vehicle"], own["reference"], own["frame"])
     show(done, console)
     return [done], done.result
