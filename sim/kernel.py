@@ -148,7 +148,7 @@ def _sense(m: Model, y: np.ndarray, c: np.ndarray, around: Around, f: np.ndarray
     """Features of the motion relative to the water, which planes and propeller meet where they are."""
     a = around
     fill_features(m, a.felt, c, f)
-    if a.sea.waves.amplitude.size == 0:
+    if not a.waves:
         return
     u, v, w, p, q, r = y[0], y[1], y[2], y[3], y[4], y[5]
     n_planes, k = m.planes.shape[0], PROBES

@@ -11,6 +11,7 @@ tables, which know the submerged boat only.
 
 from __future__ import annotations
 
+from math import cos, sin
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
@@ -30,12 +31,16 @@ class Surroundings(NamedTuple):
     """Of one boat and thread.
 
     sea, sums : Waves and the boat's points in them; a sea without components is calm.
-    cells : Of the hull, for emergence; without any the boat is taken as submerged.
+    waves : Whether it has any. time, value, slope : Of ``sums``, at hand: every access to a
+        tuple of many arrays costs what it holds.
+    cells : Of the hull, for emergence. box : (2, 3) corners of a box around it [m]. crest :
+        Highest elevation that can come [m].
     drift : Mean second-order loads of the waves.
     added : (6, 6) added mass of the left-hand side. parts : (k + 1, 6, 6) what each section
         has of it, then the rest. volume : (k,) volume of the cells of each section [m^3].
     specific_weight : rho g [N/m^3].
-    clock : (2,) time at the start of the step, and now [s].
+    clock : (3,) time at the start of the step, now, and of ``found`` [s]; the last negative
+        when that is not known.
     found : (n,) wave quantities now, in the layout of ``sim.wave_loads.at``.
     felt : (12,) state with velocities relative to the water. lost : (6,) load of emergence
         [N, N m]. dry : (k,) emerged volume by section [m^3]. wet : (6, 6) added mass of the wet
@@ -44,7 +49,13 @@ class Surroundings(NamedTuple):
 
     sea: Sea
     sums: Passage
+    waves: bool
+    time: Array
+    value: Array
+    slope: Array
     cells: Cells
+    box: Array
+    crest: float
     drift: Drift
     added: Array
     parts: Array
@@ -77,18 +88,29 @@ def _wet_added_mass(a: Surroundings, share: float) -> None:
                 a.wet[i, j] += left * a.parts[k, i, j]
 
 
+@njit(cache=True, error_model="numpy")
+def _emerge(a: Surroundings, y: Array) -> float:
+    """Emerged share of the volume; load and added mass of what is left into ``a``."""
+    surface = a.found[a.found.size - a.cells.stations.size :]
+    share = lost_buoyancy(a.cells, y, surface, a.specific_weight, a.lost, a.dry)
+    if share > 0.0:
+        _wet_added_mass(a, share)
+    return share
+
+
 def add_loads(around: Around, y: Array, out: Array) -> None:
     """Add the loads of waves and emergence, X Y Z K M N body axes [N, N m], to ``out``."""
     share = 0.0
-    if around.cells.volumes.size:
-        surface = around.found[around.found.size - around.cells.stations.size :]
-        share = lost_buoyancy(around.cells, y, surface, around.specific_weight, around.lost, around.dry)
+    st, ct = sin(y[10]), cos(y[10])
+    top, down = y[8], (-st, ct * sin(y[9]), ct * cos(y[9]))
+    for i in range(3):
+        top += min(down[i] * around.box[0, i], down[i] * around.box[1, i])
+    if top < around.crest:
+        share = _emerge(around, y)
         for i in range(6):
             out[i] += around.lost[i]
-        if share > 0.0:
-            _wet_added_mass(around, share)
     around.emerged[0] = share
-    if around.sea.waves.amplitude.size:
+    if around.waves:
         added = around.wet if share > 0.0 else around.added
         around.mean[:] = 0.0
         add_mean(around.drift, y, around.mean)
@@ -102,7 +124,8 @@ def add_loads(around: Around, y: Array, out: Array) -> None:
 def prepare(around: Around, y: Array, time: float) -> None:
     """Make the surroundings ready for a step that starts at ``y`` [SI] and ``time`` [s]."""
     around.clock[0] = around.clock[1] = time
-    if around.sea.waves.amplitude.size:
+    around.clock[2] = -1.0
+    if around.waves:
         wave_loads.advance(around.sea, y, time, around.sums)
 
 
@@ -115,8 +138,11 @@ def observe(around: Around, y: Array) -> None:
     """Wave quantities and relative velocities of state ``y`` at the time of the clock."""
     for i in range(12):
         around.felt[i] = y[i]
-    if around.sea.waves.amplitude.size:
-        wave_loads.at(around.sums, around.clock[1], around.found)
+    if around.waves:
+        # Two stages of a step are at the same time.
+        if around.clock[2] != around.clock[1]:
+            wave_loads.interpolate(around.time, around.value, around.slope, around.clock[1], around.found)
+            around.clock[2] = around.clock[1]
         for i in range(6):
             around.felt[i] -= around.found[WATER + i]
 
@@ -129,7 +155,7 @@ def read_gauge(around: Around, state: Array, rate: Array) -> None:
     around : After ``prepare``.
     state, rate : (12,) of the boat at the time of the clock; entry 8 is changed.
     """
-    if around.sea.waves.amplitude.size:
+    if around.waves:
         head, change = wave_loads.gauge(around.sea, around.sums, around.clock[1])
         state[8] += head
         rate[8] += change

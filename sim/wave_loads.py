@@ -378,16 +378,22 @@ def at(pas: Passage, time: float, out: Array) -> None:
         along the motion [m/s^2, rad/s^2], which times the added mass is the added-mass load;
         WATER; PROBES; gauge; elevations.
     """
-    h = pas.time[1] - pas.time[0]
-    t = (time - pas.time[0]) / h
+    interpolate(pas.time, pas.value, pas.slope, time, out)
+
+
+@njit(cache=True, error_model="numpy")
+def interpolate(span: Array, value: Array, slope: Array, time: float, out: Array) -> None:
+    """``at`` on the arrays time, value and slope of a passage."""
+    h = span[1] - span[0]
+    t = (time - span[0]) / h
     a, b = (1.0 + 2.0 * t) * (1.0 - t) * (1.0 - t), t * t * (3.0 - 2.0 * t)
     c, d = h * t * (1.0 - t) * (1.0 - t), h * t * t * (t - 1.0)
     for i in range(out.size):
-        out[i] = a * pas.value[0, i] + b * pas.value[1, i] + c * pas.slope[0, i] + d * pas.slope[1, i]
+        out[i] = a * value[0, i] + b * value[1, i] + c * slope[0, i] + d * slope[1, i]
     e, f, g = 6.0 * t * (1.0 - t) / h, (1.0 - t) * (1.0 - 3.0 * t), t * (3.0 * t - 2.0)
     for i in range(6):
         k = WATER + i
-        out[WATER_RATE + i] = e * (pas.value[1, k] - pas.value[0, k]) + f * pas.slope[0, k] + g * pas.slope[1, k]
+        out[WATER_RATE + i] = e * (value[1, k] - value[0, k]) + f * slope[0, k] + g * slope[1, k]
 
 
 @njit(cache=True, error_model="numpy")
