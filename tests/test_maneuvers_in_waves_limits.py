@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numba import njit
 
-from ident.sea_cases import regular_waves, turn_drift
+from ident.sea_cases import irregular_waves, regular_waves, turn_drift
 from sim.case import Case, WavesData, load_case
 from sim.in_waves import shares, surroundings, water_around
 from sim.pressure import rotation
@@ -201,3 +201,17 @@ def test_a_mistake_in_the_waves_of_a_case_is_named(tmp_path, waves, words):
     with pytest.raises(InputError, match="waves") as caught:
         load_case(str(path))
     assert words in str(caught.value)
+
+
+def test_a_seed_gives_the_same_sea_and_its_statistics(coefficients):
+    """Significant values follow the significant height; another seed is another sea of the same size."""
+    case = _changed("periscope-depth", run={"duration_s": 900.0})
+    first, again = (simulate(case, coefficients) for _ in range(2))
+    other = simulate(_changed("periscope-depth", run={"duration_s": 900.0}, waves={"seed": 9}), coefficients)
+    assert np.array_equal(first.record, again.record)
+    assert not np.array_equal(first.record, other.record)
+    found, others = irregular_waves(first), irregular_waves(other)
+    # The boat moves less than the surface, whose significant height is 1.9 m.
+    assert 0.2 < found["D0_significant_m"] < 1.9
+    assert others["theta_significant_deg"] == pytest.approx(found["theta_significant_deg"], rel=0.35)
+    assert found["broaching_per_hour"] == 0.0
