@@ -9,6 +9,7 @@ from numba import njit
 from ident.sea_cases import irregular_waves, regular_waves, turn_drift
 from sim.case import Case, WavesData, load_case
 from sim.in_waves import shares, surroundings, water_around
+from sim.mean_loads import dipole_body, plane_waves, scattering
 from sim.pressure import rotation
 from sim.simulate import model_of, simulate, water_of
 from sim.surroundings import prepare, read_gauge
@@ -163,6 +164,20 @@ def test_harmonics_in_head_seas_beside_cfd(coefficients, name, depth, pitch):
     cfd = {p.metric: p.value for p in case.published if p.source == "CFD"}
     assert depth[0] < found["dz1_over_aw"] / cfd["dz1_over_aw"] < depth[1]
     assert pitch[0] < found["theta1_deg"] / cfd["theta1_deg"] < pitch[1]
+
+
+@pytest.mark.parametrize(("depth", "most"), [(2.5, 0.03), (23.69, 0.005)])
+def test_the_surface_answers_little_to_a_boat_in_long_waves(coefficients, environment, depth, most):
+    """Image, radiated and scattered waves, left out of the first-order loads, change heave and pitch by this much."""
+    body = dipole_body(coefficients, environment)
+    number = 2.0 * np.pi / 140.9
+    frequency = np.sqrt(environment.gravity * number)
+    encounter = frequency + 5.14444 * number
+    kappa, field = plane_waves(body, number, np.array([np.pi]))
+    velocity = frequency / (1j * number) * field
+    for answering in (number, encounter**2 / environment.gravity):
+        near, far = (scattering(body, answering, kappa, velocity, d + 11.37).motion[0] for d in (depth, depth + 400.0))
+        assert np.abs(near[[2, 4]]) == pytest.approx(np.abs(far[[2, 4]]), rel=most)
 
 
 def test_waves_need_the_geometry_of_the_vehicle(coefficients):
