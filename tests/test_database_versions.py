@@ -210,9 +210,10 @@ def test_writer_killed_at_any_moment_leaves_the_last_version_readable(few, db):
     commit(db, few, {})
     moments = random.Random(5)
     seen = 0
-    for _ in range(5):
+    for trial in range(5):
         process = start(LOOP, db)
-        time.sleep(moments.uniform(0.0, 0.25))
+        # Later each time: on a loaded machine a first commit takes seconds.
+        time.sleep(moments.uniform(0.0, 0.25) * 2.0**trial)
         process.kill()
         process.communicate()
         back, number = read_rows(db)
