@@ -15,7 +15,7 @@ from ident.figures import FRAME, readable
 from ident.silhouette import Silhouette, from_above, from_the_side, silhouette
 from sim.errors import InputError
 from sim.simulate import Simulation
-from sim.waves import Waves, kinematics
+from sim.waves import Waves, kinematics, mean_direction
 
 if TYPE_CHECKING:
     from sim.vehicle import Vehicle
@@ -191,10 +191,9 @@ def _note(axis: Any, x: float, text: str, side: str) -> None:
 
 def _wave_arrow(waves: Waves, axis: Any) -> None:
     """Where the waves travel to, each component by its energy."""
-    energy = waves.amplitude**2
-    north, east = float(energy @ waves.north), float(energy @ waves.east)
+    north, east = mean_direction(waves)
     size = math.hypot(north, east)
-    if size < 1e-6 * float(energy.sum()):
+    if size < 1e-6:
         return
     box = axis.get_window_extent()
     # Fractions of the panel; east is down on paper.

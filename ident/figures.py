@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ident.bands import Bands
 from ident.validate import Validation
+from sim.database import version_words
 from sim.simulate import CHANNELS, Simulation
 
 Array = NDArray[np.float64]
@@ -40,7 +41,7 @@ _LABELS = {
 _ALONG = {"t": "time t [s]", "s": "path length over ground s [m]"}
 _STYLE = {"EXP": ("k", "o"), "CFD": ("tab:blue", "s")}
 # Depth grows downwards on paper too.
-_DOWNWARDS = ("z", "D0")
+DOWNWARDS = ("z", "D0")
 _UNITS = CHANNELS | {"dV": "rad", "dH": "rad"}
 _SHOWN = {
     "turning_circle": ("psi", "D0", "U", "phi"),
@@ -114,12 +115,42 @@ def _series(done: Validation, channel: str, axis: Any, bands: Bands | None) -> N
     for flight, style in _flights(done):
         values, unit = _shown(flight[channel], _UNITS[channel])
         axis.plot(flight[along], values, **style)
-    _dress(axis, _ALONG[along], f"{_LABELS.get(channel, channel)} [{unit}]")
-    if channel in _DOWNWARDS:
+    dress(axis, _ALONG[along], f"{_LABELS.get(channel, channel)} [{unit}]")
+    if channel in DOWNWARDS:
         axis.invert_yaxis()
 
 
-def _dress(axis: Any, x: str, y: str) -> None:
+def pyplot() -> Any:
+    """Matplotlib's pyplot, drawing to files."""
+    import matplotlib as mpl
+
+    mpl.use("Agg")
+    import matplotlib.pyplot as plt
+
+    return plt
+
+
+def finish(figure: Any, path: Path, title: str, stamp: str) -> Path:
+    """Put title, database version and frame on top, write and close.
+
+    Parameters
+    ----------
+    path : File to write; the suffix chooses the format.
+    title : Case and vehicle. stamp : Database version.
+
+    Returns
+    -------
+    ``path``.
+    """
+    figure.suptitle(f"{title}\n{stamp}; {FRAME}", fontsize=10)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    figure.savefig(path, dpi=120)
+    pyplot().close(figure)
+    return path
+
+
+def dress(axis: Any, x: str, y: str) -> None:
+    """Name the axes of a panel, with a grid."""
     axis.set_xlabel(x)
     axis.set_ylabel(y)
     axis.grid(alpha=0.3)
@@ -134,7 +165,7 @@ def _track(done: Validation, axis: Any) -> None:
             axis.plot(np.interp(place, *series["y"][:2]), x, **_line(done, source))
     for flight, style in _flights(done):
         axis.plot(flight["y"], flight["x"], **style)
-    _dress(axis, "transfer y, to starboard [m]", "advance x, ahead [m]")
+    dress(axis, "transfer y, to starboard [m]", "advance x, ahead [m]")
     axis.set_aspect("equal", adjustable="datalim")
 
 
@@ -145,7 +176,7 @@ def _spiral(done: Validation, axis: Any) -> None:
     axis.plot(rudder, rate, color="tab:red", marker="o", ms=4, lw=1.2, label="simulated from the database")
     axis.axhline(0.0, color="k", lw=0.6)
     axis.axvline(0.0, color="k", lw=0.6)
-    _dress(axis, "horizontal command dH [deg]", "steady yaw rate r [deg/s]")
+    dress(axis, "horizontal command dH [deg]", "steady yaw rate r [deg/s]")
 
 
 def _grid(done: Validation, axes: Any) -> None:
@@ -161,7 +192,7 @@ def _grid(done: Validation, axes: Any) -> None:
         for depth in sorted({p["depth_m"] for p in grid}):
             points = [p for p in grid if p["depth_m"] == depth and p[key] is not None]
             axis.plot([p["speed_mps"] for p in points], [p[key] for p in points], marker="o", label=f"D0 = {depth:g} m")
-        _dress(axis, "speed U [m/s]", label)
+        dress(axis, "speed U [m/s]", label)
     for value in done.case.published:
         axes[0].axhline(value.value, color="tab:blue", ls="--", lw=1.0, label=f"{value.source} {value.metric}")
 
@@ -205,8 +236,8 @@ def _over_time(done: Validation, channel: str, axis: Any) -> None:
     for flight, style in _flights(done):
         values, unit = _shown(flight[channel], _UNITS[channel])
         axis.plot(flight["t"], values, **style)
-    _dress(axis, _ALONG["t"], f"{_LABELS.get(channel, channel)} [{unit}]")
-    if channel in _DOWNWARDS:
+    dress(axis, _ALONG["t"], f"{_LABELS.get(channel, channel)} [{unit}]")
+    if channel in DOWNWARDS:
         axis.invert_yaxis()
 
 
@@ -223,21 +254,7 @@ def case_figure(done: Validation, path: Path, bands: Bands | None = None) -> Pat
     -------
     ``path``.
     """
-    import matplotlib as mpl
-
-    mpl.use("Agg")
-    import matplotlib.pyplot as plt
-
-    figure, labelled = _draw(done, plt, bands)
+    figure, labelled = _draw(done, pyplot(), bands)
     handles, labels = labelled.get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=4, frameon=False)
-    database = done.result["database"]
-    figure.suptitle(
-        f"{done.case.title}, {done.case.vehicle}\n"
-        f"database version {database['version']} ({database['digest'][:16]}); {FRAME}",
-        fontsize=10,
-    )
-    path.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(path, dpi=120)
-    plt.close(figure)
-    return path
+    return finish(figure, path, f"{done.case.title}, {done.case.vehicle}", version_words(done.result["database"]))

@@ -134,8 +134,8 @@ def measured(
     columns: dict[str, Metrics]
     if case.maneuver == "turning_circle":
         columns = {label: turning.turning_circle(channels_of(flight)) for label, flight in flights.items()}
-        for label, flight in flights.items() if case.waves else ():
-            columns[label] |= sea_cases.turn_drift(flight)
+        if case.waves:
+            columns = {label: found | sea_cases.turn_drift(flights[label]) for label, found in columns.items()}
         for source in _sources(case):
             channels = reference_channels(reference, source)
             if {"x", "y"} <= set(channels):

@@ -14,6 +14,7 @@ from ident.boats import Boat, Fleet
 from ident.validate import Validation, errors, flights, validate
 from sim.case import load_case
 from sim.catalogue import CatalogueError
+from sim.database import version_words
 from sim.errors import InputError
 from sim.trim import NoEquilibrium
 from sim.vehicle import Vehicle, bundled, load_vehicle
@@ -195,10 +196,9 @@ def _ratio(value: float | None) -> str:
 def _errors_table(board: dict[str, Any]) -> Table:
     from rich.table import Table
 
-    database = board["database"]
     table = Table(
         *("case", "reference", "channel", "RMSE", "parent", "published", "ratio", "to parent", "unit", "trained"),
-        title=f"Scoreboard, database version {database['version']} ({database['digest'][:16]})",
+        title=f"Scoreboard, {version_words(board['database'])}",
     )
     for case, source, channel, e in entries(board["cases"]):
         numbers = [_number(e[k]) for k in ("rmse", "parent_rmse", "published_model_rmse")]

@@ -12,7 +12,9 @@ from numpy.typing import NDArray
 from ident import seakeeping, seaway
 from ident.exceedance import exceedances
 from ident.seakeeping_published import as_published
+from sim.database import version_words
 from sim.simulate import Simulation
+from sim.waves import mean_direction
 
 if TYPE_CHECKING:
     from ident.validate import Validation
@@ -72,8 +74,7 @@ def turn_drift(simulation: Simulation) -> Metrics:
     if len(whole) < 3 or simulation.waves is None or simulation.waves.amplitude.size == 0:
         return dict.fromkeys((*names, *sizes))
     waves, centre, time, size = simulation.waves, [], [], []
-    energy = waves.amplitude**2
-    ahead = np.array([energy @ waves.north, energy @ waves.east]) / energy.sum()
+    ahead = mean_direction(waves)
     ahead /= max(float(np.hypot(*ahead)), 1e-12)
     for k in whole:
         use = turns == k
@@ -104,7 +105,7 @@ def sea_figures(done: Validation, folder: Path) -> list[Path]:
     from ident.seakeeping_figures import exceedance_figure, seaway_figure, spectrum_figure
 
     database = done.result["database"]
-    stamp = f"database version {database['version']} ({database['digest'][:16]})"
+    stamp = version_words(database)
     title, name = f"{done.case.title}, {done.case.vehicle}", f"{done.case.name}_v{database['version']}"
     found = seaway.statistics(done.simulation, _CHANNELS)
     met = seaway.encountered(done.simulation.waves, done.simulation, start=found["D0"].start)
@@ -145,7 +146,7 @@ def harmonics_over_depth(done: list[Validation], folder: Path) -> Path | None:
     ]
     columns = ["source", "channel", "D0_m", "value", "unit", "sigma"]
     database = chosen[0].result["database"]
-    stamp = f"database version {database['version']} ({database['digest'][:16]})"
+    stamp = version_words(database)
     path = folder / f"harmonics_in_waves_v{database['version']}.png"
     title = f"First harmonics in regular head waves, {chosen[0].case.vehicle}"
     return harmonics_figure(flown, pd.DataFrame(rows, columns=columns), path, title, stamp)

@@ -25,7 +25,7 @@ from ident import condense
 from ident.reduction import Fitted, fit_history
 from ident.regression import least_squares
 from sim.errors import InputError
-from sim.simulate import CHANNELS, Simulation
+from sim.simulate import CHANNELS, DERIVED, Simulation
 from sim.waves import Waves
 
 Array = NDArray[np.float64]
@@ -125,6 +125,20 @@ class Harmonics:
 def channel_unit(channel: str) -> str:
     """Unit of a channel of a simulation; planes and commands are in radians."""
     return CHANNELS.get(channel, "rad")
+
+
+def check_channels(simulation: Simulation, channels: Sequence[str], where: str) -> None:
+    """Refuse channels that a flight does not have over time.
+
+    Raises
+    ------
+    InputError
+        Naming ``where``, the channel, and those there are.
+    """
+    known = [c for c in (*simulation.columns, *DERIVED) if c not in ("t", "s")]
+    for name in channels:
+        if name not in known:
+            raise InputError(where, f"channel {name!r}", ", ".join(known))
 
 
 def encounter_of(waves: Waves, time: Array, north: Array, east: Array) -> Encounter:
@@ -318,10 +332,7 @@ def harmonics(
     waves = waves if waves is not None else simulation.waves
     if waves is None:
         raise InputError("harmonics in waves", "a flight in calm water", "one in a regular wave")
-    known = (*simulation.columns, "U", "D0", "u_over_U0", "dz_over_L0")
-    for name in channels:
-        if name not in known or name == "t":
-            raise InputError("harmonics in waves", f"channel {name!r}", ", ".join(known[1:]))
+    check_channels(simulation, channels, "harmonics in waves")
     use = simulation["t"] >= start
     if use.sum() < 2:
         end = f"the record ends at {simulation['t'][-1]:.4g} s"

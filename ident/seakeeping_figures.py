@@ -11,7 +11,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from ident.exceedance import Side, exceedances, rice_rate
-from ident.figures import FRAME, readable
+from ident.figures import DOWNWARDS, dress, finish, pyplot, readable
 from ident.seakeeping import Harmonics
 from ident.seakeeping_published import as_published
 from ident.seaway import Statistics, spectrum, uniform_step
@@ -25,7 +25,6 @@ _STYLES: dict[str, Any] = {
     "EXP": {"color": "k", "marker": "o", "ls": ""},
     "HDM": {"color": "tab:green", "marker": "^", "ls": "", "label": "published model (HDM)"},
 }
-_DOWNWARDS = ("z", "D0")
 # Levels drawn on an exceedance plot, and how far beyond the largest counted one.
 _LEVELS = 60
 _BEYOND = 4.5
@@ -37,30 +36,6 @@ _LABEL_OF = {
     "dz1_over_aw": r"depth: first harmonic over wave amplitude, $z_1/a_w$ [-]",
     "theta1": r"pitch: first harmonic $\theta_1$ [deg]",
 }
-
-
-def _pyplot() -> Any:
-    import matplotlib as mpl
-
-    mpl.use("Agg")
-    import matplotlib.pyplot as plt
-
-    return plt
-
-
-def _finish(figure: Any, path: Path, title: str, stamp: str) -> Path:
-    """Title, database version and frame on top, as on every figure; write and close."""
-    figure.suptitle(f"{title}\n{stamp}; {FRAME}", fontsize=10)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(path, dpi=120)
-    _pyplot().close(figure)
-    return path
-
-
-def _dress(axis: Any, x: str, y: str) -> None:
-    axis.set_xlabel(x)
-    axis.set_ylabel(y)
-    axis.grid(alpha=0.3)
 
 
 def seaway_figure(
@@ -85,7 +60,7 @@ def seaway_figure(
     -------
     ``path``.
     """
-    plt = _pyplot()
+    plt = pyplot()
     size = (11, 2.1 * len(found) + 1.4)
     figure, axes = plt.subplots(len(found), 1, figsize=size, sharex=True, squeeze=False, layout="constrained")
     for (channel, one), axis in zip(found.items(), axes[:, 0], strict=True):
@@ -101,8 +76,8 @@ def seaway_figure(
             axis.axvspan(simulation["t"][0], one.start, color="k", alpha=0.08, lw=0, label="start-up, not used")
         if level is not None and channel == "D0" and abs(level - one.mean) < 8.0 * one.sigma:
             axis.axhline(level, color="tab:blue", ls="--", lw=1.0, label=f"broaching: D0 < {level:g} m")
-        _dress(axis, "", f"{name} [{unit}]")
-        if channel in _DOWNWARDS:
+        dress(axis, "", f"{name} [{unit}]")
+        if channel in DOWNWARDS:
             axis.invert_yaxis()
         # Above the axes, where no history can run through it.
         axis.legend(
@@ -115,7 +90,7 @@ def seaway_figure(
             columnspacing=1.2,
         )
     axes[-1, 0].set_xlabel("time t [s]")
-    return _finish(figure, path, title, stamp)
+    return finish(figure, path, title, stamp)
 
 
 def _drawn_to(frequency: Array, density: Array) -> float:
@@ -138,7 +113,7 @@ def spectrum_figure(
     -------
     ``path``.
     """
-    plt = _pyplot()
+    plt = pyplot()
     time, eta = elevation
     first = next(iter(found.values()))
     waves = spectrum(eta, uniform_step(time), first.spectrum.resolution)
@@ -156,12 +131,12 @@ def spectrum_figure(
         axis.set_title(
             f"{words}; resolution {own.resolution:.2g} rad/s, {own.segments} segments", loc="left", fontsize=9
         )
-        _dress(axis, "", rf"S [{unit}$^2$ s/rad]")
+        dress(axis, "", rf"S [{unit}$^2$ s/rad]")
         axis.set_ylim(bottom=0.0)
     highest = max(_drawn_to(own.frequency, own.density) for _, _, own, *_ in panels)
     axes[-1].set_xlim(0.0, 1.05 * highest)
     axes[-1].set_xlabel(r"frequency of encounter $\omega_e$ [rad/s]")
-    return _finish(figure, path, title, stamp)
+    return finish(figure, path, title, stamp)
 
 
 def exceedance_figure(
@@ -180,7 +155,7 @@ def exceedance_figure(
     -------
     ``path``.
     """
-    plt = _pyplot()
+    plt = pyplot()
     sense = -1.0 if side == "below" else 1.0
     largest = float((sense * (found.trend + found.deviation - found.mean)).max())
     reach = max(_BEYOND * found.sigma, 1.05 * largest)
@@ -221,9 +196,9 @@ def exceedance_figure(
     known = level is not None and rice_rate(found, level) > _LEAST
     bottom = min(0.1 / hours, 0.3 * rice_rate(found, float(level or 0.0))) if known else 0.1 / hours
     axis.set_ylim(max(bottom, _LEAST), 2.0 * rate.max())
-    _dress(axis, f"level of {name} [{unit}]", f"crossings to {side} the level [1/h]")
+    dress(axis, f"level of {name} [{unit}]", f"crossings to {side} the level [1/h]")
     axis.legend(fontsize=8, frameon=False)
-    return _finish(figure, path, title, stamp)
+    return finish(figure, path, title, stamp)
 
 
 def harmonics_figure(
@@ -241,7 +216,7 @@ def harmonics_figure(
     -------
     ``path``.
     """
-    plt = _pyplot()
+    plt = pyplot()
     figure, axes = plt.subplots(1, 2, figsize=(10, 4.8), layout="constrained")
     depths = sorted(flown)
     for channel, axis in zip(_LABEL_OF, axes, strict=True):
@@ -253,8 +228,8 @@ def harmonics_figure(
         for source, rows in reference[reference["channel"] == channel].groupby("source"):
             style = {"label": str(source), "color": "tab:gray", "marker": "v", "ls": ""} | _STYLES.get(str(source), {})
             axis.errorbar(rows["D0_m"], rows["value"], yerr=2.0 * rows["sigma"], ms=6, capsize=3, **style)
-        _dress(axis, "depth of the sail top D0 [m]", _LABEL_OF[channel])
+        dress(axis, "depth of the sail top D0 [m]", _LABEL_OF[channel])
         axis.set_ylim(bottom=0.0)
         axis.set_xlim(left=0.0)
     figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=4, frameon=False)
-    return _finish(figure, path, title, stamp)
+    return finish(figure, path, title, stamp)

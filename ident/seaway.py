@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ident import condense, reduction
-from ident.seakeeping import channel_unit, drift_columns
+from ident.seakeeping import channel_unit, check_channels, drift_columns
 from sim.errors import InputError
 from sim.simulate import Simulation
 from sim.waves import Waves, kinematics
@@ -301,10 +301,7 @@ def statistics(
     InputError
         As ``statistics_of``; for a channel that is not there.
     """
-    known = (*simulation.columns, "U", "D0", "u_over_U0", "dz_over_L0")
-    for name in channels:
-        if name not in known or name == "t":
-            raise InputError("statistics in waves", f"channel {name!r}", ", ".join(known[1:]))
+    check_channels(simulation, channels, "statistics in waves")
     use = simulation["t"] >= start
     time = simulation["t"][use]
     return {

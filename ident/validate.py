@@ -14,7 +14,7 @@ from ident.coverage import outside_tables
 from ident.measure import measured
 from ident.sweep import with_grid
 from sim.case import Case, Reference, Series, load_case, load_reference, read_series
-from sim.database import axis_columns
+from sim.database import axis_columns, version_words
 from sim.errors import InputError
 from sim.schema import FrameData
 from sim.simulate import CHANNELS, Simulation, fly
@@ -306,10 +306,7 @@ def show(done: Validation, console: Console) -> None:
     from rich.table import Table
 
     result = done.result
-    database = result["database"]
-    console.print(
-        f"[bold]{escape(done.case.title)}[/], database version {database['version']} ({database['digest'][:16]})"
-    )
+    console.print(f"[bold]{escape(done.case.title)}[/], {version_words(result['database'])}")
     if result["references"]:
         table = Table("reference", "channel", "RMSE", "published model", "ratio", "unit", title="Errors")
         for source, channels in result["references"].items():

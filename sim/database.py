@@ -7,6 +7,7 @@ has no list of its own. A version is one commit of a Delta Lake table.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -66,6 +67,11 @@ def column_order() -> list[str]:
     """All columns in the order they are stored."""
     first = ["vehicle", "coefficient", "part", "output"]
     return [*first, *axis_columns(), *[c for c in COLUMNS if c not in first]]
+
+
+def version_words(database: Mapping[str, Any]) -> str:
+    """Version and digest for people, from the ``version`` and ``digest`` of a result."""
+    return f"database version {database['version']} ({database['digest'][:16]})"
 
 
 @dataclass(frozen=True)

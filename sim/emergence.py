@@ -16,7 +16,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from sim.mesh import Mesh
-from sim.pressure import fill_rotation
+from sim.pressure import box_top, fill_rotation
 
 Array = NDArray[np.float64]
 _SIDES = (1.0, -1.0)
@@ -162,8 +162,7 @@ def lost_buoyancy(c: Cells, y: Array, surface: Array, specific_weight: float, ou
     m = np.empty((3, 3))
     fill_rotation(y[9], y[10], y[11], m)
     a, b, d = m[2, 0], m[2, 1], m[2, 2]
-    top = min(a * c.low[0], a * c.high[0]) + min(b * c.low[1], b * c.high[1]) + min(d * c.low[2], d * c.high[2])
-    if y[8] + top + lowest > 0.0:
+    if y[8] + box_top(c.low, c.high, a, b, d) + lowest > 0.0:
         return 0.0
     total, mx, my, mz = 0.0, 0.0, 0.0, 0.0
     for i in range(c.volumes.size):

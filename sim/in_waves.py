@@ -13,13 +13,12 @@ from numpy.typing import NDArray
 from sim.catalogue import ACCELERATIONS, OUTPUTS
 from sim.emergence import Cells, cells
 from sim.errors import InputError
-from sim.mesh import Mesh
 from sim.pressure import Quadrature, quadrature
 from sim.surface import read_geometry
 from sim.surroundings import Surroundings
 from sim.wave_drift import Drift, make_drift
-from sim.wave_loads import Sea, make_sea, passage
-from sim.waves import Waves, make_waves
+from sim.wave_loads import Sea, make_sea, passage, section_added_mass
+from sim.waves import Waves, calm
 
 if TYPE_CHECKING:
     from sim.coefficients import Coefficients
@@ -85,35 +84,39 @@ def probes(vehicle: Vehicle) -> Array:
     return np.array([*[p.position for p in vehicle.planes], position.value], dtype=float)
 
 
-def _mesh(vehicle: Vehicle) -> Mesh:
-    """The surface of a vehicle.
+def _geometry(vehicle: Vehicle) -> str:
+    """The geometry file of a vehicle; raises ``InputError`` when it names none."""
+    if vehicle.geometry is None:
+        where = f"vehicle {vehicle.name}, key geometry"
+        raise InputError(where, "nothing", "a geometry file: waves and emergence need it")
+    return str(vehicle.geometry)
+
+
+# Points and cells are a second of work, and the same for every flight of a vehicle.
+@lru_cache(maxsize=8)
+def _points(geometry: str, shortest: float, displaced: float) -> Quadrature:
+    return quadrature(read_geometry(Path(geometry)), shortest, displaced)
+
+
+def volume_points(vehicle: Vehicle, environment: Environment) -> Quadrature:
+    """Volume points of a vehicle, scaled to its displaced mass.
+
+    With the surface's own volume instead, a neutrally buoyant boat would not follow long waves.
 
     Raises
     ------
     InputError
         When the vehicle names no geometry, or the geometry file is wrong.
     """
-    if vehicle.geometry is None:
-        where = f"vehicle {vehicle.name}, key geometry"
-        raise InputError(where, "nothing", "a geometry file: waves and emergence need it")
-    return read_geometry(vehicle.geometry)
-
-
-def volume_points(vehicle: Vehicle, environment: Environment) -> Quadrature:
-    """Volume points of a vehicle, scaled to its displaced mass; raises as ``read_geometry``.
-
-    With the surface's own volume instead, a neutrally buoyant boat would not follow long waves.
-    """
     particulars = vehicle.particulars
     displaced = particulars.displaced_mass.value / environment.density
-    return quadrature(_mesh(vehicle), _SHORTEST * particulars.length.value, displaced)
+    return _points(_geometry(vehicle), _SHORTEST * particulars.length.value, displaced)
 
 
 @lru_cache(maxsize=8)
 def _cells(
     geometry: str, displaced: float, centre: tuple[float, ...], sections: tuple[tuple[float, ...], ...]
 ) -> Cells:
-    # A second of work, and the same for every flight of a vehicle.
     return cells(read_geometry(Path(geometry)), displaced=displaced, centre=centre, sections=np.array(sections))
 
 
@@ -128,10 +131,8 @@ def hull_cells(vehicle: Vehicle, environment: Environment, sections: Array) -> C
     """
     particulars = vehicle.particulars
     displaced = particulars.displaced_mass.value / environment.density
-    if vehicle.geometry is None:
-        _mesh(vehicle)
     centre = tuple(float(v) for v in particulars.centre_of_buoyancy.value)
-    return _cells(str(vehicle.geometry), displaced, centre, tuple(map(tuple, sections.tolist())))
+    return _cells(_geometry(vehicle), displaced, centre, tuple(map(tuple, sections.tolist())))
 
 
 @dataclass(frozen=True)
@@ -185,9 +186,8 @@ def water_around(
     places = probes(vehicle) if waves.amplitude.size else np.zeros((0, 3))
     box = np.stack([hull.low, hull.high])
     sea = make_sea(waves, volume, centres, masses, places, span, stations=hull.stations, box=box)
-    nothing = np.zeros(0)
-    calm = make_waves(nothing, nothing, nothing, nothing, waves.density, waves.gravity)
-    drift = make_drift(coefficients, environment, waves if second_order else calm, top_speed)
+    second = waves if second_order else calm(waves.density, waves.gravity)
+    drift = make_drift(coefficients, environment, second, top_speed)
     return Water(sea, hull, drift, centres, masses, environment.density * environment.gravity)
 
 
@@ -215,15 +215,14 @@ def shares(added: Array, centres: Array, masses: Array) -> Array:
     (k + 1, 6, 6), the last what no section carries.
     """
     scale = np.array([1.0, 1.0, 1.0, *[max(float(np.abs(centres).max(initial=0.0)), 1.0)] * 3])
+    unit = np.outer(scale, scale)
     parts = np.zeros((len(centres) + 1, 6, 6))
     for k, (r, m) in enumerate(zip(centres, masses, strict=True)):
-        x, y, z = r
-        motion = np.hstack([np.eye(3), -np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])]) / scale
-        parts[k] = motion.T @ (m[:, None] * motion)
-    own = added / np.outer(scale, scale)
+        parts[k] = section_added_mass(r, m) / unit
+    own = added / unit
     turn = _root(0.5 * (own + own.T), 0.5) @ _root(parts.sum(axis=0), -0.5)
     parts[:-1] = turn @ parts[:-1] @ turn.T
-    parts *= np.outer(scale, scale)
+    parts *= unit
     parts[-1] = added - parts[:-1].sum(axis=0)
     return parts
 
@@ -246,7 +245,7 @@ def surroundings(water: Water, model: Model) -> Surroundings:
         value=sums.value,
         slope=sums.slope,
         cells=water.cells,
-        box=np.stack([water.cells.low, water.cells.high]),
+        box=water.sea.box,
         crest=water.sea.crest,
         drift=water.drift,
         added=np.ascontiguousarray(model.added_mass),

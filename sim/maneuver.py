@@ -323,7 +323,6 @@ def run(
         left = dt
         while left > 0.0:
             now = step * dt + (dt - left)
-            prepare(work.around, y, now)
             rk4(m, y, c, rate, left, work, stages, trial)
             part = left
             happens = (zigzag or programmed) and _past(s, state, trial, now + left) >= 0.0
@@ -349,6 +348,7 @@ def run(
                 if ends:
                     return rows, events, logged, now
             _actuators(s, command, c, max(left, _EVENT_TOLERANCE), rate)
+            prepare(work.around, y, now)
     return rows, events, logged, steps * dt
 
 

@@ -54,6 +54,19 @@ def fill_rotation(phi: float, theta: float, psi: float, out: Array) -> None:
     out[2, 0], out[2, 1], out[2, 2] = -st, sf * ct, cf * ct
 
 
+@njit(cache=True, error_model="numpy")
+def box_top(low: Array, high: Array, a: float, b: float, d: float) -> float:
+    """Depth of the highest corner of a body-axis box below the body origin [m]; negative above.
+
+    Parameters
+    ----------
+    low, high : (3,) corners of the box [m].
+    a, b, d : Downward direction in body axes: last row of ``rotation``.
+    """
+    along = min(a * low[0], a * high[0])
+    return along + min(b * low[1], b * high[1]) + min(d * low[2], d * high[2])
+
+
 def surface_load(mesh: Mesh, pressure: Callable[[Array], Array]) -> Array:
     """Load of a pressure field by the triangles, Eqs. (43)-(46): exact for linear pressure.
 

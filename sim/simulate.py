@@ -19,7 +19,7 @@ from sim.model import Environment, assemble, weight_across, with_tanks
 from sim.spectra import Spectrum, realise, sea_state
 from sim.trim import Trim, self_propulsion
 from sim.vehicle import Vehicle
-from sim.waves import Waves, make_waves, regular
+from sim.waves import Waves, calm, regular
 
 Array = NDArray[np.float64]
 # Time between sums of the waves [s], or the step if that is longer.
@@ -271,8 +271,7 @@ def waves_of(case: Case) -> Waves:
     density, gravity = case.environment.density_kgpm3, case.environment.gravity_mps2
     data = case.waves
     if data is None:
-        nothing = np.zeros(0)
-        return make_waves(nothing, nothing, nothing, nothing, density, gravity)
+        return calm(density, gravity)
     direction = math.radians(data.direction_deg)
     if data.kind == "regular":
         length = data.length_m or gravity * (data.period_s or 0.0) ** 2 / (2.0 * math.pi)

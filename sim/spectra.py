@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.errors import InputError
-from sim.waves import Waves, make_waves
+from sim.waves import Waves, calm, make_waves
 
 Array = NDArray[np.float64]
 
@@ -178,7 +178,7 @@ def realise(spectrum: Spectrum, components: int, seed: int, density: float, grav
     phase = draw.uniform(0.0, 2.0 * np.pi, components)
     direction = _directions(spectrum.spreading, spectrum.direction, components, draw)
     if spectrum.height == 0.0:
-        return make_waves(np.zeros(1), np.ones(1), np.zeros(1), np.zeros(1), density, gravity)
+        return calm(density, gravity)
     edges = np.interp(energy[-1] * np.arange(components + 1) / components, energy, grid)
     edges[[0, -1]] = grid[[0, -1]]
     m0, m2 = np.diff(np.interp(edges, grid, energy)), np.diff(np.interp(edges, grid, second))

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from sim import wave_loads
 from sim.emergence import Cells, lost_buoyancy
+from sim.pressure import box_top
 from sim.wave_drift import Drift, add_mean
 from sim.wave_loads import FORCE, WATER, WATER_RATE, Passage, Sea
 
@@ -41,7 +42,7 @@ class Surroundings(NamedTuple):
     specific_weight : rho g [N/m^3].
     clock : (3,) time at the start of the step, now, and of ``found`` [s]; the last negative
         when that is not known.
-    found : (n,) wave quantities now, in the layout of ``sim.wave_loads.at``.
+    found : (n,) wave quantities now, in the layout of ``sim.wave_loads.interpolate``.
     felt : (12,) state with velocities relative to the water. lost : (6,) load of emergence
         [N, N m]. dry : (k,) emerged volume by section [m^3]. wet : (6, 6) added mass of the wet
         part. mean : (6,) second-order loads [N, N m]. emerged : (1,) emerged share of the volume.
@@ -102,10 +103,7 @@ def add_loads(around: Around, y: Array, out: Array) -> None:
     """Add the loads of waves and emergence, X Y Z K M N body axes [N, N m], to ``out``."""
     share = 0.0
     st, ct = sin(y[10]), cos(y[10])
-    top, down = y[8], (-st, ct * sin(y[9]), ct * cos(y[9]))
-    for i in range(3):
-        top += min(down[i] * around.box[0, i], down[i] * around.box[1, i])
-    if top < around.crest:
+    if y[8] + box_top(around.box[0], around.box[1], -st, ct * sin(y[9]), ct * cos(y[9])) < around.crest:
         share = _emerge(around, y)
         for i in range(6):
             out[i] += around.lost[i]

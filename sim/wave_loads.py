@@ -31,7 +31,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from sim.pressure import Quadrature, fill_rotation
+from sim.pressure import Quadrature, box_top, fill_rotation
 from sim.wave_sums import sum_few, sum_many
 from sim.waves import Waves
 
@@ -41,7 +41,7 @@ Single = NDArray[np.float32]
 # Layout of the vector of wave quantities: then three velocities a probe, the head of the wave's
 # pressure at the depth gauge, one elevation a station.
 FORCE, IMPULSE, WATER, PROBES = 0, 6, 12, 18
-# What ``at`` puts in the place of IMPULSE.
+# What ``interpolate`` puts in the place of IMPULSE.
 WATER_RATE = IMPULSE
 # From this many components on, single precision in vector registers is faster.
 MANY = 8
@@ -102,6 +102,22 @@ class Passage(NamedTuple):
     matrix: Array
 
 
+def section_added_mass(centre: Array, mass: Array) -> Array:
+    """J^T diag(c m) J with J = [1, -[r]x], Eqs. (36)-(41): what a section adds about the origin.
+
+    Parameters
+    ----------
+    centre, mass : (3,) r [m] and c m in x, y, z [kg].
+
+    Returns
+    -------
+    (6, 6) [kg, kg m, kg m^2].
+    """
+    x, y, z = centre
+    motion = np.hstack([np.eye(3), -np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])])
+    return np.asarray(motion.T @ (mass[:, None] * motion))
+
+
 def make_sea(
     waves: Waves,
     volume: Quadrature,
@@ -136,9 +152,7 @@ def make_sea(
     centres, masses, probes = (np.reshape(np.asarray(a, dtype=float), (-1, 3)) for a in (centres, masses, probes))
     added = np.zeros((6, 6))
     for r, m in zip(centres, masses, strict=True):
-        x, y, z = r
-        motion = np.hstack([np.eye(3), -np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])])
-        added += motion.T @ (m[:, None] * motion)
+        added += section_added_mass(r, m)
     along = np.zeros(0) if stations is None else np.asarray(stations, dtype=float)
     over = np.column_stack([along, np.zeros((along.size, 2))])
     gauge = np.zeros((1, 3))
@@ -244,10 +258,8 @@ def _add(points: Array, i: int, fx: float, fy: float, fz: float, out: Array, at:
 @njit(cache=True, error_model="numpy")
 def _near(sea: Sea, y: Array, matrix: Array) -> bool:
     """Whether a crest can reach the boat before the next sums; ``matrix`` turns body to earth."""
-    top = y[8] - sea.span * sqrt(y[0] * y[0] + y[1] * y[1] + y[2] * y[2])
-    for k in range(3):
-        top += min(matrix[2, k] * sea.box[0, k], matrix[2, k] * sea.box[1, k])
-    return top <= sea.crest
+    rise = sea.span * sqrt(y[0] * y[0] + y[1] * y[1] + y[2] * y[2])
+    return y[8] + box_top(sea.box[0], sea.box[1], matrix[2, 0], matrix[2, 1], matrix[2, 2]) - rise <= sea.crest
 
 
 @njit(cache=True, error_model="numpy")
@@ -366,31 +378,33 @@ def advance(sea: Sea, y: Array, time: float, pas: Passage) -> None:
     evaluate(sea, pas.state, pas.time[1], pas, pas.value[1], pas.slope[1])
 
 
+@njit(cache=True, error_model="numpy", inline="always")
+def _hermite(span: Array, time: float) -> tuple[float, float, float, float, float, float, float]:
+    """Weights of a cubic between two sums: of the values and slopes at its ends, in the value
+    (four) and in its rate (of the difference of the values, and of the slopes)."""
+    h = span[1] - span[0]
+    t = (time - span[0]) / h
+    a, b = (1.0 + 2.0 * t) * (1.0 - t) * (1.0 - t), t * t * (3.0 - 2.0 * t)
+    c, d = h * t * (1.0 - t) * (1.0 - t), h * t * t * (t - 1.0)
+    e, f, g = 6.0 * t * (1.0 - t) / h, (1.0 - t) * (1.0 - 3.0 * t), t * (3.0 * t - 2.0)
+    return a, b, c, d, e, f, g
+
+
 @njit(cache=True, error_model="numpy")
-def at(pas: Passage, time: float, out: Array) -> None:
+def interpolate(span: Array, value: Array, slope: Array, time: float, out: Array) -> None:
     """Wave quantities at a time inside the present span, by cubic Hermite interpolation.
 
     Parameters
     ----------
-    pas : After ``advance``.
+    span, value, slope : ``time``, ``value`` and ``slope`` of a passage, after ``advance``.
     time : [s].
     out : (n,) FORCE Froude-Krylov load [N, N m]; WATER_RATE rate of the water's u v w p q r
         along the motion [m/s^2, rad/s^2], which times the added mass is the added-mass load;
         WATER; PROBES; gauge; elevations.
     """
-    interpolate(pas.time, pas.value, pas.slope, time, out)
-
-
-@njit(cache=True, error_model="numpy")
-def interpolate(span: Array, value: Array, slope: Array, time: float, out: Array) -> None:
-    """``at`` on the arrays time, value and slope of a passage."""
-    h = span[1] - span[0]
-    t = (time - span[0]) / h
-    a, b = (1.0 + 2.0 * t) * (1.0 - t) * (1.0 - t), t * t * (3.0 - 2.0 * t)
-    c, d = h * t * (1.0 - t) * (1.0 - t), h * t * t * (t - 1.0)
+    a, b, c, d, e, f, g = _hermite(span, time)
     for i in range(out.size):
         out[i] = a * value[0, i] + b * value[1, i] + c * slope[0, i] + d * slope[1, i]
-    e, f, g = 6.0 * t * (1.0 - t) / h, (1.0 - t) * (1.0 - 3.0 * t), t * (3.0 * t - 2.0)
     for i in range(6):
         k = WATER + i
         out[WATER_RATE + i] = e * (value[1, k] - value[0, k]) + f * slope[0, k] + g * slope[1, k]
@@ -409,9 +423,7 @@ def gauge(sea: Sea, pas: Passage, time: float) -> tuple[float, float]:
     -------
     p / (rho g) [m] and its rate [m/s]: what a depth gauge reads beside the depth.
     """
-    i, h = pas.value.shape[1] - sea.stations - 1, pas.time[1] - pas.time[0]
-    t = (time - pas.time[0]) / h
-    p, q, r, s = pas.value[0, i], pas.value[1, i], h * pas.slope[0, i], h * pas.slope[1, i]
-    value = p + t * (r + t * (3.0 * (q - p) - 2.0 * r - s + t * (2.0 * (p - q) + r + s)))
-    rate = r + t * (2.0 * (3.0 * (q - p) - 2.0 * r - s) + 3.0 * t * (2.0 * (p - q) + r + s))
-    return value, rate / h
+    i = pas.value.shape[1] - sea.stations - 1
+    p, q, r, s = pas.value[0, i], pas.value[1, i], pas.slope[0, i], pas.slope[1, i]
+    a, b, c, d, e, f, g = _hermite(pas.time, time)
+    return a * p + b * q + c * r + d * s, e * (q - p) + f * r + g * s

@@ -89,6 +89,24 @@ def make_waves(
     return Waves(a, w * w / gravity, w, np.cos(chi), np.sin(chi), e, float(density), float(gravity))
 
 
+def calm(density: float, gravity: float) -> Waves:
+    """No component: calm water."""
+    nothing = np.zeros(0)
+    return make_waves(nothing, nothing, nothing, nothing, density, gravity)
+
+
+def mean_direction(waves: Waves) -> Array:
+    """Where the waves travel to, each component by its energy.
+
+    Returns
+    -------
+    (2,) north and east over the sum of the energies: one long for a long-crested sea, nothing
+    where components cancel. Of at least one component.
+    """
+    energy = waves.amplitude**2
+    return np.array([energy @ waves.north, energy @ waves.east]) / energy.sum()
+
+
 def regular(
     height: float, length: float, direction: float, density: float, gravity: float, phase: float = 0.0
 ) -> Waves:

@@ -145,7 +145,7 @@ def test_interpolated_loads_follow_the_exact_ones(boat, seaway):
         miss = np.zeros(len(size))
         for t, y, known in zip(times, path, exact, strict=True):
             wave_loads.advance(sea, y, t, sums)
-            wave_loads.at(sums, t, out)
+            wave_loads.interpolate(sums.time, sums.value, sums.slope, t, out)
             miss = np.maximum(miss, np.abs(out - known) / size)
         worst.append(miss.max())
     assert worst[0] < 5e-3
@@ -159,7 +159,7 @@ def test_sums_are_made_anew_after_a_jump(boat, seaway):
     wave_loads.advance(sea, _state(), 0.0, sums)
     for y, time in ((_state(x=140.0), 0.4), (_state(psi=1.5), 0.8), (_state(), 0.1)):
         wave_loads.advance(sea, y, time, sums)
-        wave_loads.at(sums, time, out)
+        wave_loads.interpolate(sums.time, sums.value, sums.slope, time, out)
         value, slope = _evaluate(sea, y, time)
         assert out[:6] == pytest.approx(value[:6], rel=1e-9)
         assert out[6:12] == pytest.approx(slope[12:18], rel=1e-9)

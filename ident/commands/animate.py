@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from ident.commands.shared import DB, VERSION, console_for, emit
+from ident.commands.shared import DB, VERSION, console_for, emit, equilibrium_of
 
 
 @click.command()
@@ -69,22 +69,16 @@ def film(
     from ident.animation import animate as draw
     from ident.animation import writer_of
     from ident.validate import validate
-    from sim.errors import InputError
-    from sim.trim import NoEquilibrium
+    from sim.database import version_words
 
     frames, fps, start, end = pictures
     console = console_for(quiet=json_path == "-")
     if out is not None:
         writer_of(out, fps)
-    try:
-        with console.status("flying the case"):
-            done = validate(case, db, version, vehicle)
-    except NoEquilibrium as error:
-        raise InputError(f"case {case}", str(error), "a state the boat can hold") from error
+    with equilibrium_of(case), console.status("flying the case"):
+        done = validate(case, db, version, vehicle)
     database = done.result["database"]
-    title = (
-        f"{done.case.title}, {done.case.vehicle}; database version {database['version']} ({database['digest'][:16]})"
-    )
+    title = f"{done.case.title}, {done.case.vehicle}; {version_words(database)}"
     path = out or Path(f"{done.case.name}.gif")
     with Progress(console=console, transient=True) as progress:
         task = progress.add_task("drawing", total=frames)

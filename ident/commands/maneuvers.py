@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from ident.commands.shared import DB, OUT, VERSION, console_for, emit
+from ident.commands.shared import DB, OUT, VERSION, console_for, emit, equilibrium_of
 
 
 @click.command()
@@ -62,7 +62,6 @@ def validate(
              ident validate --all
     """
     from sim.errors import InputError
-    from sim.trim import NoEquilibrium
 
     if (case is None) == (not every):
         raise click.UsageError("give either --case NAME or --all")
@@ -75,10 +74,8 @@ def validate(
     if out.exists() and not out.is_dir():
         raise InputError(str(out), "a file", "a folder for the figures")
     console = console_for(quiet=json_path == "-")
-    try:
+    with equilibrium_of(case or "of --all"):
         done, result = _one(case, db, version, own, console) if case else _all(db, version, cases, console)
-    except NoEquilibrium as error:
-        raise InputError(f"case {case or 'of --all'}", str(error), "a state the boat can hold") from error
     from ident.figures import case_figure
 
     bands = _bands(done[0], result, samples, seed, dask, console) if samples else None

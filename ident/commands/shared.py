@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -36,6 +38,18 @@ def emit(data: Any, target: str) -> None:
         from sim.errors import InputError
 
         raise InputError(target, f"cannot be written: {error.strerror}", "a path you may write to, or -") from error
+
+
+@contextmanager
+def equilibrium_of(case: str) -> Iterator[None]:
+    """Says of which case there is no equilibrium: ``NoEquilibrium`` becomes an ``InputError``."""
+    from sim.errors import InputError
+    from sim.trim import NoEquilibrium
+
+    try:
+        yield
+    except NoEquilibrium as error:
+        raise InputError(f"case {case}", str(error), "a state the boat can hold") from error
 
 
 def console_for(quiet: bool = False) -> Any:
