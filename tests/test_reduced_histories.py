@@ -50,6 +50,29 @@ def test_standard_errors_of_means_hold_on_ar1(phi, n):
     assert np.std(estimates) == pytest.approx(true_error(phi, n), rel=0.15)
 
 
+@pytest.mark.parametrize("rate", [10.0, 250.0])
+@pytest.mark.parametrize("slow", [0.0, 0.3])
+def test_standard_errors_of_means_hold_under_a_vibration_at_any_sampling_rate(rate, slow):
+    """A lightly damped oscillator at 2 Hz, alone and over a drift with 1 s correlation time; 80 s each.
+
+    Both are autoregressions of known spectrum at zero. The drift decides the error of the mean, and is
+    far below what a short autoregression of the samples themselves sees.
+    """
+    n, m = round(80.0 * rate), round(25.0 * rate)
+    r, turn = math.exp(-0.02 * 4.0 * math.pi / rate), 4.0 * math.pi / rate
+    noise = np.random.default_rng(31).standard_normal((60, n + m))
+    swing = lfilter([1.0], [1.0, -2.0 * r * math.cos(turn), r * r], noise, axis=1)[:, m:]
+    gain = (1.0 + r * r) / ((1.0 - r * r) * (1.0 + r**4 - 2.0 * r * r * math.cos(2.0 * turn)))
+    phi = math.exp(-1.0 / rate)
+    drift = ar1(phi, n, 60, 32) * math.sqrt(1.0 - phi**2)
+    at_zero = 1.0 / (1.0 - 2.0 * r * math.cos(turn) + r * r) ** 2 / gain + slow**2 * (1.0 + phi) / (1.0 - phi)
+    fits = [fitted(y, dt=1.0 / rate) for y in swing / math.sqrt(gain) + slow * drift]
+    errors = np.sqrt([f.covariance[0, 0, 0] for f in fits])
+    assert np.sqrt(np.mean(errors**2)) == pytest.approx(math.sqrt(at_zero / n), rel=0.3)
+    scores = np.array([f.values[0, 0] for f in fits]) / errors
+    assert np.mean(np.abs(scores) < 1.96) > 0.85
+
+
 def test_short_record_is_not_called_converged():
     """Four correlation times are no mean: 200 samples of phi = 0.98."""
     verdicts = [fitted(y).converged for y in ar1(0.98, 200, 50, 3)]
@@ -232,14 +255,14 @@ def test_constant_acceleration_gives_the_load_at_mid_time(tmp_path):
 
 
 def test_rel_sigma_is_added_to_the_statistical_error(tmp_path):
-    y = 100.0 + np.random.default_rng(1).standard_normal(500)
+    y = 100.0 + np.random.default_rng(1).standard_normal(2000)
     text = "time_s,Y_N\n" + "\n".join(f"{0.1 * i:.3f},{v:.9g}" for i, v in enumerate(y))
     found = []
     for name, more in (("a", ""), ("b", "rel_sigma = 0.03\n")):
         campaign(tmp_path / name, history("h.csv", constants=CONSTANTS + more))
         (tmp_path / name / "h.csv").write_text(text)
         found.append(read_campaign(tmp_path / name).runs.iloc[0])
-    assert found[0]["s_Y"] == pytest.approx(1.0 / math.sqrt(500), rel=0.2)
+    assert found[0]["s_Y"] == pytest.approx(1.0 / math.sqrt(2000), rel=0.2)
     assert found[1]["s_Y"] == pytest.approx(math.hypot(found[0]["s_Y"], 0.03 * found[1]["Y"]), rel=1e-9)
 
 
