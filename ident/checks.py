@@ -144,7 +144,7 @@ def check_campaign(campaign: Campaign, folder: Path | None = None) -> list[Findi
     Constant coefficients are identified for it and checked as a table of derivatives.
     """
     evidence = evidence_of(campaign, folder)
-    if campaign.vehicle.term_set != "reduced":
+    if campaign.vehicle.term_set != "reduced" and not campaign.runs.empty:
         evidence = replace(evidence, derivatives=constants(identify(campaign)))
     return run(evidence)
 

@@ -49,6 +49,24 @@ class Channels:
     first_row: int = 2
 
 
+class NotRising(InputError):
+    """A history whose time stamps do not rise, with nothing to stand in for them.
+
+    Attributes
+    ----------
+    file : Of the run.
+    row : Of the data, where time first does not rise.
+    clock : All of its stamps.
+    first_row : File row of the first stamp.
+    """
+
+    def __init__(self, channels: Channels, clock: Clock, at: int, found: str) -> None:
+        text = "a time that rises; or rate_hz in [source.reduction] where stamps have too few digits"
+        super().__init__(f"{channels.path}, data row {at + 1}, column time", found, text)
+        self.file, self.row = channels.path.name, at + 1
+        self.clock, self.first_row = clock, channels.first_row
+
+
 @dataclass(frozen=True)
 class Reduced:
     """One reduced history, for the verdict and the plot.
@@ -103,10 +121,10 @@ def _timed(channels: Channels, rule: Reduction, clock: Clock | None = None) -> I
         step = np.diff(time, prepend=last)
         if (step <= 0.0).any():
             i = int(np.flatnonzero(step <= 0.0)[0])
-            place = f"{channels.path}, data row {count + i + 1}, column time"
-            text = "a time that rises; or rate_hz in [source.reduction] where stamps have too few digits"
-            found = f"{time[i]:g} s after {time[i - 1] if i else last:g} s{_in_all(channels, at)}"
-            raise InputError(place, found, text)
+            whole = _whole(channels, at)
+            faults = whole.repeats + whole.backs
+            more = f"; {faults} of {whole.samples} stamps repeat or step back" if faults > 1 else ""
+            raise NotRising(channels, whole, count + i, f"{time[i]:g} s after {time[i - 1] if i else last:g} s{more}")
         count, last = count + len(piece), float(time[-1])
         keep = np.ones(len(time), dtype=bool)
         if rule.start_s is not None:
@@ -117,13 +135,12 @@ def _timed(channels: Channels, rule: Reduction, clock: Clock | None = None) -> I
             yield time[keep], piece[keep][:, others]
 
 
-def _in_all(channels: Channels, at: int | None) -> str:
-    """How many stamps of a file do not rise, where it is more than one."""
+def _whole(channels: Channels, at: int | None) -> Clock:
+    """All stamps of a history."""
     clock = Clock()
     for piece in channels.pieces() if at is not None else ():
         clock.feed(piece[:, at])
-    count = clock.repeats + clock.backs
-    return f"; {count} of {clock.samples} stamps repeat or step back" if count > 1 else ""
+    return clock
 
 
 def reduce(channels: Channels, rule: Reduction, run_id: str, frequency: float | None) -> tuple[dict[str, Any], Reduced]:
@@ -145,7 +162,7 @@ def reduce(channels: Channels, rule: Reduction, run_id: str, frequency: float | 
     Raises
     ------
     InputError
-        Without time, loads or enough samples, or for a time that does not rise.
+        Without time, loads or enough samples; ``NotRising`` for a time that does not rise.
     """
     names = [q for q in channels.quantities if q != "time"]
     loads = [q for q in names if q in OUTPUTS]

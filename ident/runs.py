@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,7 @@ import pandas as pd
 
 from ident.campaign_file import CampaignFile
 from ident.conversions import DIRECT, MOTION, dimensional, quantity_of
-from ident.histories import Channels, Pieces, Reduced, reduce, states
+from ident.histories import Channels, NotRising, Pieces, Reduced, reduce, states
 from ident.quantities import Column, column, owner, suffixed
 from ident.readers import matching, open_sheet, openfoam, reader_of
 from ident.readers.source import Source
@@ -29,20 +30,37 @@ _STATES = ("U", "alpha", "beta", "D0", "plane", "n", "J", *MOTION)
 _SLACK = 1e-9
 
 
-def source_runs(folder: Path, source: Source, header: CampaignFile) -> tuple[pd.DataFrame, list[Reduced], list[Path]]:
-    """All runs of one source.
+@dataclass
+class Found:
+    """What some sources gave.
+
+    Attributes
+    ----------
+    tables : Runs, a table a file: text columns, quantities in SI, ``file``, ``row``, ``reduction``.
+    reduced : The histories that were reduced, in order.
+    refused : Those whose time stamps do not rise.
+    inputs : Paths that were read.
+    """
+
+    tables: list[pd.DataFrame] = field(default_factory=list)
+    reduced: list[Reduced] = field(default_factory=list)
+    refused: list[NotRising] = field(default_factory=list)
+    inputs: list[Path] = field(default_factory=list)
+
+
+def source_runs(folder: Path, source: Source, header: CampaignFile, found: Found) -> list[pd.DataFrame]:
+    """Add all runs of one source to what was found.
 
     Parameters
     ----------
     folder : The campaign's.
     source : One ``[[source]]``.
     header : The campaign, for frame, scale and density.
+    found : Its lists grow.
 
     Returns
     -------
-    runs : Text columns, quantities in SI, ``file``, ``row``, ``reduction``.
-    reduced : The histories that were reduced, in order.
-    inputs : Paths that were read.
+    The tables that were added.
 
     Raises
     ------
@@ -52,16 +70,24 @@ def source_runs(folder: Path, source: Source, header: CampaignFile) -> tuple[pd.
     paths = matching(folder, source)
     where = str(folder / "campaign.toml")
     tables: list[pd.DataFrame] = []
-    reduced: list[Reduced] = []
     for path in paths:
         stated = constants(folder, path, source)
-        if source.rows == "history":
-            table, found = _from_histories(path, source, header, stated, where)
-            reduced += found
-        else:
-            table = _from_table(path, source, header, stated, where)
-        tables.append(outside_excluded(table, source, where))
-    return pd.concat(tables, ignore_index=True), reduced, paths
+        name = path.relative_to(folder).as_posix()
+        try:
+            if source.rows == "history":
+                table, reduced = _from_histories(path, source, header, stated, where)
+                found.reduced += [replace(one, file=name) for one in reduced]
+            else:
+                table = _from_table(path, source, header, stated, where)
+        except NotRising as error:
+            # Every such file is to be named, not the first alone.
+            error.file = name
+            found.refused.append(error)
+            continue
+        tables.append(outside_excluded(table.assign(file=name), source, where))
+    found.tables += tables
+    found.inputs += paths
+    return tables
 
 
 def outside_excluded(table: pd.DataFrame, source: Source, where: str) -> pd.DataFrame:
