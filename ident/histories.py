@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ident import condense, reduction
 from ident.clock import Clock
-from ident.quantities import HARMONICS
+from ident.quantities import HARMONICS, TAKEN
 from ident.readers.source import MOTIONS, Reduction
 from sim.catalogue import OUTPUTS
 from sim.errors import InputError
@@ -225,7 +225,7 @@ def _harmonic_values(names: list[str], fit: reduction.Fitted, frequency: float) 
     covariance = {}
     for c_, name in enumerate(names):
         own = turn @ fit.values[:, c_]
-        if name in OUTPUTS:
+        if name.removeprefix(TAKEN) in OUTPUTS:
             values |= {f"{name}_{h}": float(v) for h, v in zip(HARMONICS, own, strict=True)}
             covariance[name] = turn @ fit.covariance[c_] @ turn.T
         elif name != "displacement":
@@ -280,12 +280,12 @@ def states(run: dict[str, Any], rule: Reduction, frame: Frame, ittc: bool, where
         usual = _STEADY_TEST.get(rule.motion, "rotating_arm")
         state["test"] = (run.get("test") or usual) if at_velocity else "acceleration"
         weights = phase_row(theta)
-        for output in OUTPUTS:
+        for output in (*OUTPUTS, *(TAKEN + o for o in OUTPUTS)):
             parts = np.array([run.get(f"{output}_{h}", math.nan) for h in HARMONICS], dtype=float)
             if np.isnan(parts).all():
                 continue
             state[output] = float(weights @ np.nan_to_num(parts))
-            if output in run.get("covariance", {}):
+            if output in OUTPUTS and output in run.get("covariance", {}):
                 variance = float(weights @ run["covariance"][output] @ weights)
                 state[f"s_{output}"] = math.sqrt(max(variance, 0.0))
         for name_ in ("covariance", "frequency", "amplitude", "displacement"):

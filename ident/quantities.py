@@ -21,6 +21,8 @@ from sim.errors import InputError
 # A load, its standard error, and what an oscillatory test is reduced to: mean, then in
 # phase and in quadrature with the displacement, first to third harmonic.
 HARMONICS = ("mean", "in", "out", "in2", "out2", "in3", "out3")
+# Before a load: what ``[[source.subtract]]`` took off it.
+TAKEN = "taken_"
 # Dimensionless input needs a named normalisation for these.
 PRIMED = {
     **dict.fromkeys(("X", "Y", "Z"), "force"),

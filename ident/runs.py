@@ -16,9 +16,10 @@ from ident.conversions import DIRECT, MOTION, dimensional, quantity_of
 from ident.histories import Channels, NotRising, Pieces, Reduced, reduce, states
 from ident.quantities import Column, column, owner, suffixed
 from ident.readers import matching, open_sheet, openfoam, reader_of
-from ident.readers.source import Source
+from ident.readers.source import NO_COLUMNS, Source
 from ident.readers.table import Sheet, columns_of, run_cells
 from ident.readers.text import LARGEST, Dialect
+from ident.subtract import off_samples, off_table, taken_columns
 from sim.catalogue import OUTPUTS
 from sim.errors import InputError
 
@@ -204,6 +205,11 @@ def _from_table(path: Path, source: Source, header: CampaignFile, stated: Stated
         columns.setdefault(name, "")
     out = pd.DataFrame({**columns, "file": path.name, "row": rows, "reduction": ""}, index=range(len(rows)))
     out = dimensional(out, primed, source.normalisation, header, where)
+    if source.subtract:
+        totals = {q for q in columns if owner(q) in OUTPUTS and not q.startswith(("s_", "sigma_"))}
+        taken = taken_columns(sheet, source, header, totals, where)
+        cells = pd.DataFrame({i: _numbers(sheet, table.iloc[:, t.at], rows, t.kind) for i, t in enumerate(taken)})
+        out = off_table(out, taken, cells, source, header, sheet)
     return _spread(out, source, header, str(path)) if source.reduction else out
 
 
@@ -284,6 +290,8 @@ def _channels(
 ) -> Iterator[tuple[str, Channels]]:
     """The histories of a path: part (empty where the campaign names it) and channels."""
     if reader_of(path, source) == "openfoam":
+        if source.subtract:
+            raise InputError(f"{where}, key source.subtract", "an OpenFOAM case", NO_COLUMNS)
         yield from _openfoam(path, source, header, where)
         return
     sheet = open_sheet(path, source)
@@ -294,13 +302,20 @@ def _channels(
     primed = {k.quantity for _, k in wanted if k.primed}
     one = pd.DataFrame([{**dict.fromkeys(names, 1.0), "U": numbers.get("U"), "file": path.name, "row": 1}])
     scales = dimensional(one, primed, source.normalisation, header, where).iloc[0]
-    factors = np.array([float(scales[k.quantity]) if k.primed else k.factor for _, k in wanted])
+    factors = [float(scales[k.quantity]) if k.primed else k.factor for _, k in wanted]
+    taken = taken_columns(sheet, source, header, {n for n in names if n in OUTPUTS}, where)
+    for one_taken in taken:
+        own = pd.DataFrame([{one_taken.kind.quantity: 1.0, "U": numbers.get("U"), "file": path.name, "row": 1}])
+        part = {one_taken.kind.quantity} if one_taken.kind.primed else set()
+        made = dimensional(own, part, source.normalisation, header, where).iloc[0]
+        factors.append(float(made[one_taken.kind.quantity]) * one_taken.kind.factor)
+    channels, matrix = off_samples(names, taken, np.array(factors))
 
     def pieces() -> Iterator[np.ndarray]:
-        for block in sheet.numbers([i for i, _ in wanted]):
-            yield block * factors
+        for block in sheet.numbers([*(i for i, _ in wanted), *(t.at for t in taken)]):
+            yield block @ matrix if taken else block * factors
 
-    yield "", Channels(path, names, pieces, sheet.first_row)
+    yield "", Channels(path, channels, pieces, sheet.first_row)
 
 
 def _openfoam(path: Path, source: Source, header: CampaignFile, where: str) -> Iterator[tuple[str, Channels]]:

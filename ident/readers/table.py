@@ -222,13 +222,28 @@ def open_parquet(path: Path, source: Source) -> Sheet:
 OPENERS = {"table": open_csv, "starccm": open_csv, "columns": open_columns, "parquet": open_parquet}
 
 
+def position(sheet: Sheet, name: str) -> int:
+    """Where a column of ``[[source.subtract]]`` stands, by its whole header or the header without its unit.
+
+    Raises
+    ------
+    InputError
+        When there is none.
+    """
+    for names in (sheet.header, [split(h)[0] for h in sheet.header]):
+        if name in names:
+            return names.index(name)
+    shown = ", ".join(sheet.header)[:200]
+    raise InputError(sheet.where, f"no column {name[:60]!r}, which [[source.subtract]] names", shown)
+
+
 def columns_of(sheet: Sheet, source: Source, text: tuple[str, ...]) -> list[Column | None]:
     """What every column of a sheet is; None for ignored and text columns.
 
     Parameters
     ----------
     sheet : The open table.
-    source : Its ``columns``, ``patterns`` and ``ignore``.
+    source : Its ``columns``, ``patterns`` and ``ignore``; columns of ``subtract`` are passed over.
     text : Names of the text columns of a run table.
 
     Raises
@@ -238,11 +253,17 @@ def columns_of(sheet: Sheet, source: Source, text: tuple[str, ...]) -> list[Colu
         columns of one quantity.
     """
     by_pattern = _by_pattern(sheet, source)
+    parts = {position(sheet, name) for one in source.subtract for name in one.columns}
     found: list[Column | None] = []
-    for header in sheet.header:
+    for i, header in enumerate(sheet.header):
         name = split(header)[0]
         declared = by_pattern.get(header) or source.columns.get(header) or source.columns.get(name)
-        if (
+        if i in parts:
+            if declared is not None:
+                found_twice = f"column {header[:60]!r} in [[source.subtract]] and in [source.columns] or patterns"
+                raise InputError(sheet.where, found_twice, "one of the two")
+            found.append(None)
+        elif (
             declared is None
             and (source.patterns or any(fnmatch.fnmatchcase(h, p) for h in (header, name) for p in source.ignore))
         ) or (declared or header) in text:
