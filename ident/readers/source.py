@@ -97,11 +97,13 @@ class Source(Data):
     ignore: list[str] = Field(default_factory=list)
     names: list[str] = Field(default_factory=list)
     header_pattern: str = ""
+    widths: Annotated[list[Annotated[int, Field(ge=1, le=1000)]], Field(max_length=1000)] = Field(default_factory=list)
     units_row: bool = False
     delimiter: Literal["", ",", ";", "\t", " "] = ""
     decimal: Literal["", ".", ","] = ""
     thousands: Literal["", ".", ",", "'", " "] = ""
-    encoding: Literal["utf-8", "latin-1"] = "utf-8"
+    encoding: Literal["utf-8", "utf-16", "latin-1", "cp1252", "shift_jis", "cp932", "euc_jp", "gb18030"] = "utf-8"
+    skip: str = ""
     constants: dict[str, str | float] = Field(default_factory=dict)
     within: dict[str, Span] = Field(default_factory=dict)
     match: str = ""
@@ -112,7 +114,7 @@ class Source(Data):
     reduction: Reduction | None = None
     subtract: list[Subtract] = Field(default_factory=list)
 
-    @field_validator("match", "header_pattern")
+    @field_validator("match", "header_pattern", "skip")
     @classmethod
     def _pattern_compiles(cls, text: str) -> str:
         _compiled(text)
