@@ -265,7 +265,8 @@ def _from_histories(
     reduced = []
     for part, channels in _channels(path, source, header, numbers, where):
         own = dict(words) | ({"part": part} if part else {})
-        name = own.get("run_id") or path.stem
+        # Of a folder "drift_2.5" all is its name.
+        name = own.get("run_id") or (path.name if path.is_dir() else path.stem)
         own["run_id"] = f"{name}-{part}" if part else name
         frequency = numbers.get("frequency", rule.frequency_hz)
         values, one = reduce(channels, rule, own["run_id"], frequency)
@@ -337,6 +338,10 @@ def _openfoam(path: Path, source: Source, header: CampaignFile, where: str) -> I
     for name in source.parts:
         if name not in found:
             raise InputError(str(path), f"no function object {name!r}", ", ".join(found))
+    twice = [part for part in source.parts.values() if list(source.parts.values()).count(part) > 1]
+    if twice:
+        text = "one function object a part: it sums the patches that it is given"
+        raise InputError(f"{where}, key source.parts", f"{twice[0]!r} twice", text)
     chosen = source.parts or (dict.fromkeys(found, "") if len(found) == 1 else {})
     if not chosen:
         text = f"[source.parts] naming the part of each: {', '.join(found)}"

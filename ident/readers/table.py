@@ -27,6 +27,7 @@ Array = NDArray[np.float64]
 _MOST_RUNS = 100_000
 # Rows at the end of a history that may lack cells: what a run that is still being written leaves.
 _MOST_UNFINISHED = 10
+_NO_DATA = "; skip = '...' in [[source]] leaves out lines that are no data"
 
 
 @dataclass(frozen=True)
@@ -108,10 +109,10 @@ def _whole_rows(
         left += cut
         whole = Lines(block.rows[: len(text) - cut], text[: len(text) - cut])
         if whole.text:
-            yield numbers(path, whole, dialect, wanted, header)
+            yield numbers(path, whole, dialect, wanted, header, _NO_DATA)
         if cut:
             try:
-                numbers(path, Lines(block.rows[-cut:], text[-cut:]), dialect, wanted, header)
+                numbers(path, Lines(block.rows[-cut:], text[-cut:]), dialect, wanted, header, _NO_DATA)
             except InputError as error:
                 pending = pending or error
         if pending and left > _MOST_UNFINISHED:

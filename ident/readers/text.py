@@ -45,9 +45,6 @@ _SPELLED = str.maketrans({"\u00a0": " ", "\u202f": " ", "\u2009": " ", "\u2212":
 _EMPTY = ' \t\r\f\v,;"\x1a'
 
 
-_NO_DATA = "; skip = '...' in [[source]] leaves out lines that are no data"
-
-
 @dataclass(frozen=True)
 class Lines:
     """Consecutive lines of a file.
@@ -260,7 +257,7 @@ def decimal_mark(path: Path, cells: list[tuple[int, str]], both: str | None, tho
     return ","
 
 
-def numbers(path: Path, block: Lines, dialect: Dialect, wanted: list[int], names: list[str]) -> Array:
+def numbers(path: Path, block: Lines, dialect: Dialect, wanted: list[int], names: list[str], hint: str = "") -> Array:
     """The wanted columns of some rows as finite numbers.
 
     Parameters
@@ -270,6 +267,7 @@ def numbers(path: Path, block: Lines, dialect: Dialect, wanted: list[int], names
     dialect : How they are written.
     wanted : Positions of the columns.
     names : Header of every column, for their number and for the error.
+    hint : What more is allowed instead of a row with another number of cells.
 
     Returns
     -------
@@ -300,10 +298,10 @@ def numbers(path: Path, block: Lines, dialect: Dialect, wanted: list[int], names
             values = frame[wanted].to_numpy(dtype=float)
             if np.isfinite(values).all() and np.abs(values).max(initial=0.0) <= LARGEST:
                 return values
-    return _one_by_one(path, block, dialect, wanted, names)
+    return _one_by_one(path, block, dialect, wanted, names, hint)
 
 
-def _one_by_one(path: Path, block: Lines, dialect: Dialect, wanted: list[int], names: list[str]) -> Array:
+def _one_by_one(path: Path, block: Lines, dialect: Dialect, wanted: list[int], names: list[str], hint: str) -> Array:
     """The same cell by cell, to read what pandas does not and to name the cell that fails."""
     values = np.empty((len(block.text), len(wanted)))
     for i, (row, line) in enumerate(zip(block.rows, block.text, strict=True)):
@@ -311,9 +309,7 @@ def _one_by_one(path: Path, block: Lines, dialect: Dialect, wanted: list[int], n
         while len(cells) > len(names) and not cells[-1]:
             cells.pop()
         if len(cells) > len(names) or len(cells) <= max(wanted):
-            raise InputError(
-                f"{path}, row {row}", f"{len(cells)} cells", f"{len(names)} cells, as in the header{_NO_DATA}"
-            )
+            raise InputError(f"{path}, row {row}", f"{len(cells)} cells", f"{len(names)} cells, as in the header{hint}")
         for j, column in enumerate(wanted):
             value = dialect.number(cells[column])
             if value is None:
