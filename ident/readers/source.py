@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, field_validator, model_validator
 
+from ident.readers.text import Encoding
 from sim.schema import Data
 
 READERS = ("table", "parquet", "starccm", "columns", "openfoam")
@@ -102,7 +103,7 @@ class Source(Data):
     delimiter: Literal["", ",", ";", "\t", " "] = ""
     decimal: Literal["", ".", ","] = ""
     thousands: Literal["", ".", ",", "'", " "] = ""
-    encoding: Literal["utf-8", "utf-16", "latin-1", "cp1252", "shift_jis", "cp932", "euc_jp", "gb18030"] = "utf-8"
+    encoding: Encoding = "utf-8"
     skip: str = ""
     constants: dict[str, str | float] = Field(default_factory=dict)
     within: dict[str, Span] = Field(default_factory=dict)

@@ -9,7 +9,7 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal, get_args
 
 import numpy as np
 import pandas as pd
@@ -28,7 +28,8 @@ _HEAD = 200
 # Before version 3, pandas rounded the last digit unless told not to.
 _EXACT: dict[str, Any] = {} if int(pd.__version__.split(".")[0]) >= 3 else {"float_precision": "round_trip"}
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eEdD][+-]?\d{1,3})?", re.ASCII)
-ENCODINGS = ("utf-8", "utf-16", "latin-1", "cp1252", "shift_jis", "cp932", "euc_jp", "gb18030")
+Encoding = Literal["utf-8", "utf-16-le", "utf-16-be", "latin-1", "cp1252", "shift_jis", "cp932", "euc_jp", "gb18030"]
+ENCODINGS = get_args(Encoding)
 COMMENTS = ("#", "%", "!", "//")
 # A file that begins so says its encoding itself, or is no text.
 _MARKS = {b"\xef\xbb\xbf": "utf-8-sig", b"\xff\xfe": "utf-16", b"\xfe\xff": "utf-16"}
@@ -83,7 +84,7 @@ def _decoded(path: Path, encoding: str) -> Iterator[str]:
                     allowed = f"UTF-8 text, or encoding in [[source]]: {', '.join(ENCODINGS[1:])}"
                     raise InputError(place, f"not {marked} text", allowed) from error
                 if "\0" in text:
-                    allowed = 'text; or encoding = "utf-16" in [[source]] for UTF-16 without a byte order mark'
+                    allowed = 'text; or encoding = "utf-16-le" in [[source]] for UTF-16 without a byte order mark'
                     raise InputError(f"{path}, byte {at + 1} or after", "a zero byte: not a text file", allowed)
                 at += len(chunk)
                 yield text
