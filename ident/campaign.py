@@ -252,7 +252,8 @@ def _originals(folder: Path, runs: pd.DataFrame) -> pd.Series:
     if not repeated.empty:
         run = repeated.iloc[0]
         place = f"{folder / run['file']}, row {run['row']}, column run_id"
-        raise InputError(place, repr(run["run_id"]), "each run_id once a campaign")
+        text = "each run_id once a campaign; match = '(?P<run_id>...)' in [[source]] takes it from the path"
+        raise InputError(place, repr(run["run_id"]), text)
     parent = dict(zip(runs["run_id"], runs["copy_of"], strict=True))
 
     def origin(run: pd.Series) -> str:

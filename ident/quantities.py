@@ -34,6 +34,7 @@ PRIMED = {
 }
 _BRACKET = re.compile(r"^(?P<name>.*?)\s*(?:\[(?P<square>[^\[\]]*)\]|\((?P<round>[^()]*)\))$", re.DOTALL)
 _PART = re.compile(r"([A-Za-zµ]+)(?:(?:\*\*|\^)?(-?[1-4]))?")
+_RAISED = str.maketrans("⁻¹²³⁴", "-1234")
 _ANGLES = {"radian", "degree", "turn", "grade", "arcminute", "arcsecond", "milliradian"}
 _NO_UNIT = ("", "-", "1", "/")
 
@@ -113,7 +114,7 @@ def split(header: str) -> tuple[str, str | None]:
 def _clean(unit: str) -> str | None:
     """A unit in the one spelling handed to pint, or None when it is not made of units."""
     text = re.sub(r"(?<=[A-Za-z])-(?=[A-Za-z])", "*", unit)
-    text = text.replace("°", "deg").replace("º", "deg").replace("²", "2").replace("³", "3")
+    text = text.replace("°", "deg").replace("º", "deg").translate(_RAISED)
     text = re.sub(r"[·⋅.]", "*", text.replace("^", "**"))
     text = re.sub(r"(?<![*/])\s+(?![*/])", "*", text.strip())
     parts = [p.strip() for p in re.split(r"(?<!\*)\*(?!\*)|(/)", text) if p is not None]

@@ -105,10 +105,21 @@ def test_what_could_be_read_two_ways_is_refused_with_its_place(tmp_path, text, w
     assert words in str(caught.value)
 
 
-@pytest.mark.parametrize(("unit", "expected"), [("N-m", 1.0), ("ft-lbf", 1.3558179483314), ("m s-2", None)])
-def test_units_with_a_hyphen(unit, expected):
-    assert factor("N", unit) == (pytest.approx(expected) if expected else None)
-    assert factor("vdot", "m s-2") == 1.0
+@pytest.mark.parametrize(
+    ("quantity", "unit", "expected"),
+    [
+        ("N", "N-m", 1.0),
+        ("N", "kN-m", 1e3),
+        ("N", "ft-lbf", 1.3558179483314),
+        ("N", "m s-2", None),
+        ("vdot", "m s-2", 1.0),
+        ("vdot", "m·s⁻²", 1.0),
+        ("X", "t", None),
+    ],
+)
+def test_hyphens_and_raised_digits_of_units(quantity, unit, expected):
+    """A hyphen between two units multiplies, as STAR-CCM+ writes it; before a digit it is the exponent's sign."""
+    assert factor(quantity, unit) == (pytest.approx(expected) if expected else None)
 
 
 def test_words_in_brackets_are_no_unit_and_a_unit_is_no_word(tmp_path):
@@ -153,6 +164,11 @@ def test_parquet_units_from_the_metadata(tmp_path):
     assert_values(read_campaign(tmp_path).runs)
     kilo.attrs["units"] = units
     kilo.to_parquet(tmp_path / "runs.parquet")
+    assert_values(read_campaign(tmp_path).runs)
+    # A unit in the name stands, and what is no quantity has none.
+    named = kilo.rename(columns={"beta": "beta_deg"}).assign(source="tank")
+    named.attrs["units"] = {**units, "beta_deg": "deg", "source": "-"}
+    named.to_parquet(tmp_path / "runs.parquet")
     assert_values(read_campaign(tmp_path).runs)
 
 

@@ -109,6 +109,28 @@ def test_thrust_of_the_other_sign_through_the_moment_point(tmp_path):
     np.testing.assert_allclose(runs["N"], [7000.0, 7000.0])
 
 
+def test_a_part_taken_off_an_oscillation_leaves_derivatives_of_the_rest(tmp_path):
+    """Pure sway: hull -800 vdot - 150 v; a rudder of -20 vdot - 60 v, 31 m behind the moment point."""
+    omega, swing = 2.0 * np.pi * 0.25, 0.2
+    t = np.arange(0.0, 40.0, 0.02)
+    v, vdot = swing * omega * np.cos(omega * t), -swing * omega**2 * np.sin(omega * t)
+    rudder = -20.0 * vdot - 60.0 * v
+    noise = np.random.default_rng(4).standard_normal((2, t.size))
+    y, n = -800.0 * vdot - 150.0 * v + rudder + noise[0], -90.0 * v - 31.0 * rudder + noise[1]
+    state = CONSTANTS.replace('beta = "5 deg"\n', "").replace('test = "drift_horizontal"\n', "") + "rel_sigma = 0.1\n"
+    swayed = '[source.reduction]\nkind = "oscillatory"\nmotion = "sway"\nfrequency_hz = 0.25\namplitude = 0.2\n'
+    campaign(tmp_path, history("pmm.csv", constants=state, reduction=swayed) + GOOD)
+    rows = "".join(f"{a:.3f},{b!r},{c!r},{d!r}\n" for a, b, c, d in np.column_stack([t, y, n, rudder]).tolist())
+    (tmp_path / "pmm.csv").write_text("time_s,Y_N,N_Nm,RY [N]\n" + rows)
+    runs = read_campaign(tmp_path).runs.set_index("run_id")
+    speed, acceleration = swing * omega, swing * omega**2
+    assert runs["Y"]["pmm+v"] == pytest.approx(-150.0 * speed, abs=0.3)
+    assert runs["Y"]["pmm-a"] == pytest.approx(-800.0 * acceleration, abs=0.3)
+    assert runs["N"]["pmm+v"] == pytest.approx(-90.0 * speed, abs=0.3)
+    # A tenth of total and of part, in squares, and what the noise leaves.
+    assert runs["s_Y"]["pmm+v"] == pytest.approx(0.1 * np.hypot(210.0, 60.0) * speed, rel=0.01)
+
+
 RUNS = f'[[source]]\nfiles = "runs.csv"\n{CONSTANTS}rel_sigma = 0.05\n'
 GOOD = (
     '[[source.subtract]]\nwhat = "rudder"\nsource = "own balance"\ncolumns = { RY = "Y" }\nat_m = [-31.0, 0.0, 0.0]\n'

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ident.quantities import split
+from ident.quantities import owner, split, suffixed
 from ident.readers.source import Source
 from ident.readers.table import Sheet, once
 from ident.readers.text import LARGEST, Dialect
@@ -47,7 +47,7 @@ def open_parquet(path: Path, source: Source) -> Sheet:
     except bad as error:
         raise refused(error) from error
     names = [str(n) for n in schema.names]
-    header = _with_units(schema)
+    header = _with_units(schema, {*source.columns, *(name for one in source.subtract for name in one.columns)})
     once(f"{path} (schema)", header, source)
 
     def batches(wanted: list[str]) -> Iterator[tuple[int, Any]]:
@@ -80,8 +80,8 @@ def _written(cell: Any) -> str:
     return cell if isinstance(cell, str) else str(cell) if isinstance(cell, Decimal) else repr(cell)
 
 
-def _with_units(schema: Any) -> list[str]:
-    """Column names, with the unit of the metadata in brackets where the name has none."""
+def _with_units(schema: Any, declared: set[str]) -> list[str]:
+    """Column names; those of quantities with the unit of the metadata in brackets where they have none."""
     stored: dict[str, Any] = {}
     try:
         known = json.loads((schema.metadata or {}).get(b"pandas", b"{}")).get("attributes") or {}
@@ -93,8 +93,8 @@ def _with_units(schema: Any) -> list[str]:
         own = field.metadata or {}
         unit = own.get(b"unit", own.get(b"units", b"")).decode("utf-8", "replace")
         unit = unit or (stored.get(name) if isinstance(stored, dict) else None)
-        plain = split(str(name))[1] is None and isinstance(unit, str) and unit.strip()
-        header.append(f"{name} [{unit.strip()}]" if plain and unit else str(name))
+        bare = split(str(name))[1] is None and name not in suffixed() and (name in declared or owner(name.rstrip("'")))
+        header.append(f"{name} [{unit.strip()}]" if bare and isinstance(unit, str) and unit.strip() else str(name))
     return header
 
 
