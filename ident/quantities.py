@@ -179,9 +179,10 @@ def allowed_units(quantity: str) -> str:
     return (", ".join(listed) + more) if listed else "no unit: it is dimensionless"
 
 
-def _contradiction(quantity: str, stated: str | None, unit: str, place: str) -> None:
-    """Refuse a header whose brackets hold another unit than the declaration; words in brackets are no unit."""
-    if not quantity or stated in (None, "", unit) or not is_unit(stated or ""):
+def _contradiction(quantity: str, header: str, unit: str, place: str) -> None:
+    """Refuse a header whose brackets hold another unit than the declaration; words in round ones are no unit."""
+    stated = split(header)[1]
+    if not quantity or stated in (None, "", unit) or (header.rstrip().endswith(")") and not is_unit(stated or "")):
         return
     there, here = factor(quantity, stated or ""), factor(quantity, unit)
     if there is None or here is None or not math.isclose(there, here, rel_tol=1e-12):
@@ -189,14 +190,14 @@ def _contradiction(quantity: str, stated: str | None, unit: str, place: str) -> 
 
 
 def is_unit(text: str) -> bool:
-    """Whether some quantity has this unit, or pint knows it."""
+    """Whether some quantity has this unit, or pint knows it, capitals or not."""
     if text in _NO_UNIT or any(text in choices for choices in units().values()):
         return True
     import pint
 
     cleaned = _clean(text) if len(text) <= 40 else None
     try:
-        return cleaned is not None and bool(_registry().parse_units(cleaned))
+        return cleaned is not None and bool(_registry().parse_units(cleaned, case_sensitive=False))
     except (pint.errors.PintError, ValueError, TypeError, AttributeError, ArithmeticError):
         return False
 
@@ -226,7 +227,7 @@ def column(header: str, declared: str | None, where: str) -> Column:
     if declared is not None and unit is None:
         unit = split(header)[1]
     elif declared is not None:
-        _contradiction(owner(name.removesuffix("'")), split(header)[1], unit or "", place)
+        _contradiction(owner(name.removesuffix("'")), header, unit or "", place)
     if name.endswith("'") and owner(name[:-1]) in PRIMED:
         name, unit = name[:-1], "-" if unit is None else unit
     known = owner(name)

@@ -96,6 +96,7 @@ def test_tidy_tables_of_the_world(tmp_path, text, keys):
         (b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1", "an Excel workbook"),
         (PLAIN.replace("2750.25", "NaN"), "row 2, column Y [N]: 'NaN'"),
         (PLAIN.replace("2750.25", "#N/A"), "row 2, column Y [N]: '#N/A'"),
+        ("beta_deg;X [N];Note\n2;1,234;12 345\n", "row 2: '1,234' (allowed: decimal"),
         (SEMICOLONS + "2;1'2345;2;3\n", 'row 2, column X [N]: "1\'2345"'),
     ],
 )
@@ -125,8 +126,11 @@ def test_hyphens_and_raised_digits_of_units(quantity, unit, expected):
 def test_words_in_brackets_are_no_unit_and_a_unit_is_no_word(tmp_path):
     text = PLAIN.replace("X [N]", "Drag (hull)")
     assert_values(read(tmp_path / "a", text, tidy("", '"Drag (hull)" = "X [N]"')))
-    with pytest.raises(InputError, match="unit 'm', declared as 'N'"):
-        read(tmp_path / "b", text.replace("hull", "m"), tidy("", '"Drag (m)" = "X [N]"'))
+    for unit in ("m", "Kn", "KN", "Newton"):
+        with pytest.raises(InputError, match=f"unit '{unit}', declared as 'N'"):
+            read(tmp_path / "b", text.replace("hull", unit), tidy("", f'"Drag ({unit})" = "X [N]"'))
+    with pytest.raises(InputError, match="unit 'hull', declared as 'N'"):
+        read(tmp_path / "b", text.replace("(hull)", "[hull]"), tidy("", '"Drag [hull]" = "X [N]"'))
 
 
 # -- Parquet ---------------------------------------------------------------------------------

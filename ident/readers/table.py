@@ -247,7 +247,9 @@ def open_columns(path: Path, source: Source) -> Sheet:
     below = next(_blocks(path, source, ("\0",)), Lines([], []))
     below = Lines(below.rows[at + 1 : len(first.rows)], below.text[at + 1 : len(first.rows)])
     dialect = Dialect(
-        source.delimiter or " ", source.decimal or _columns_decimal(path, below, header), source.thousands
+        source.delimiter or " ",
+        source.decimal or _columns_decimal(path, below, header, source.thousands),
+        source.thousands,
     )
     for row, line in zip(below.rows, below.text, strict=True):
         cells = dialect.cells(line, f"{path}, row {row}") if dialect.delimiter == " " else line.split(dialect.delimiter)
@@ -259,14 +261,14 @@ def open_columns(path: Path, source: Source) -> Sheet:
     raise InputError(str(path), found, text)
 
 
-def _columns_decimal(path: Path, below: Lines, header: list[str]) -> str:
+def _columns_decimal(path: Path, below: Lines, header: list[str], thousands: str) -> str:
     """The decimal mark of white-space columns, from the lines that have a number in each."""
     rows = [(row, line.split()) for row, line in zip(below.rows, below.text, strict=True)]
     form = re.compile(r"[+-]?[\d.,]*\d[.,]?\d*([eEdD][+-]?\d{1,3})?", re.ASCII)
     full = [
         (row, c) for row, cells in rows if len(cells) == len(header) for c in cells if all(map(form.fullmatch, cells))
     ]
-    return decimal_mark(path, [(row, c) for row, c in full if "," in c or "." in c], None, "")
+    return decimal_mark(path, [(row, c) for row, c in full if "," in c or "." in c], None, thousands)
 
 
 def header_names(line: str) -> list[str]:

@@ -227,10 +227,11 @@ def sniff(path: Path, lines: Lines, delimiter: str = "", decimal: str = "", thou
         for c in (c.translate(_SPELLED) for c in rough.cells(line, f"{path}, row {row}"))
         if re.fullmatch(r"[+-]?\d[\d., ']*([eE][+-]?\d+)?", c, re.ASCII)
     ]
-    if not thousands:
-        # An apostrophe or a blank between groups of three digits can be nothing else.
-        grouped = (re.fullmatch(r"[+-]?\d{1,3}([' ])\d{3}(\1\d{3})*([.,]\d*)?", c) for _, c in cells)
-        thousands = next((g[1] for g in grouped if g), "") if delimiter != " " else ""
+    if not thousands and delimiter != " ":
+        # An apostrophe or a blank between groups of three digits can be nothing else, nor the mark that follows.
+        grouped = [g for _, c in cells if (g := re.fullmatch(r"[+-]?\d{1,3}([' ])\d{3}(\1\d{3})*(?:([.,])\d*)?", c))]
+        thousands = next((g[1] for g in grouped), "")
+        decimal = decimal or next((g[3] for g in grouped if g[3]), "")
     cells = [(row, c) for row, c in cells if "," in c or "." in c]
     both = next((c for _, c in cells if "," in c and "." in c), None)
     if not decimal:
@@ -251,7 +252,7 @@ def decimal_mark(path: Path, cells: list[tuple[int, str]], both: str | None, tho
     commas = [(row, c) for row, c in cells if "," in c]
     if not commas or any("." in c for _, c in cells):
         return "."
-    if not thousands and all(re.fullmatch(r"[+-]?[1-9]\d{0,2}(,\d{3})+", c) for _, c in commas):
+    if all(re.fullmatch(r"[+-]?[1-9]\d{0,2}(,\d{3})+", c) for _, c in commas):
         row, cell = commas[0]
         text = 'decimal = "," or thousands = "," in [[source]]: it could be either'
         raise InputError(f"{path}, row {row}", repr(cell), text)
