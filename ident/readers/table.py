@@ -183,13 +183,7 @@ def open_csv(path: Path, source: Source) -> Sheet:
     if longest > len(header):
         text = "a name for every column; header_pattern and delimiter where a title stands above the header"
         raise InputError(where, f"{len(header)} names above {longest} cells", text)
-    spacers: list[str] = []
-    for i in [i for i, name in enumerate(header) if not name]:
-        header[i] = f"column {i + 1}"
-        if any(len(cells) > i and cells[i] for cells in rows) and not ignored(header[i], source):
-            text = f'a name for every column, or ignore = ["{header[i]}"] in [[source]]'
-            raise InputError(where, f"a column without a name ({header[i]})", text)
-        spacers.append(header[i])
+    header, spacers = _nameless(header, rows, source, where)
     skip = first.rows[0]
     if source.units_row:
         if len(first.text) < 2:
@@ -200,7 +194,20 @@ def open_csv(path: Path, source: Source) -> Sheet:
             raise InputError(f"{path}, row {skip}", f"{len(given)} units", f"{len(header)}, one a column")
         header = [f"{name} [{unit.strip('[]()')}]" if unit else name for name, unit in zip(header, given, strict=True)]
     sheet = _text_sheet(path, source, dialect, header, first, skip)
-    return replace(sheet, spacers=tuple(spacers))
+    return replace(sheet, spacers=spacers)
+
+
+def _nameless(
+    header: list[str], rows: list[list[str]], source: Source, where: str
+) -> tuple[list[str], tuple[str, ...]]:
+    """A header with ``column 3`` where no name stands, and those names; refused where cells stand below one."""
+    names = [name or f"column {i + 1}" for i, name in enumerate(header)]
+    spacers = tuple(named for named, name in zip(names, header, strict=True) if not name)
+    for i, name in enumerate(names):
+        if name in spacers and not ignored(name, source) and any(len(cells) > i and cells[i] for cells in rows):
+            text = f'a name for every column, or ignore = ["{name}"] in [[source]]'
+            raise InputError(where, f"a column without a name ({name})", text)
+    return names, spacers
 
 
 def _below_title(path: Path, source: Source) -> tuple[Lines, str]:
@@ -248,7 +255,7 @@ def open_columns(path: Path, source: Source) -> Sheet:
     below = Lines(below.rows[at + 1 : len(first.rows)], below.text[at + 1 : len(first.rows)])
     dialect = Dialect(
         source.delimiter or " ",
-        source.decimal or _columns_decimal(path, below, header, source.thousands),
+        source.decimal or _columns_decimal(path, below, header, source),
         source.thousands,
     )
     for row, line in zip(below.rows, below.text, strict=True):
@@ -261,14 +268,15 @@ def open_columns(path: Path, source: Source) -> Sheet:
     raise InputError(str(path), found, text)
 
 
-def _columns_decimal(path: Path, below: Lines, header: list[str], thousands: str) -> str:
+def _columns_decimal(path: Path, below: Lines, header: list[str], source: Source) -> str:
     """The decimal mark of white-space columns, from the lines that have a number in each."""
-    rows = [(row, line.split()) for row, line in zip(below.rows, below.text, strict=True)]
+    mark = source.delimiter.strip(" ") or None
+    rows = [(row, [c.strip() for c in line.split(mark)]) for row, line in zip(below.rows, below.text, strict=True)]
     form = re.compile(r"[+-]?[\d.,]*\d[.,]?\d*([eEdD][+-]?\d{1,3})?", re.ASCII)
     full = [
         (row, c) for row, cells in rows if len(cells) == len(header) for c in cells if all(map(form.fullmatch, cells))
     ]
-    return decimal_mark(path, [(row, c) for row, c in full if "," in c or "." in c], None, thousands)
+    return decimal_mark(path, [(row, c) for row, c in full if "," in c or "." in c], None, source.thousands)
 
 
 def header_names(line: str) -> list[str]:
