@@ -30,10 +30,11 @@ from ident.conversions import (
     without_inertia,
     without_tare,
 )
-from ident.histories import Reduced
+from ident.findings import run_table
+from ident.histories import NotRising, Reduced
 from ident.readers import inputs
 from ident.readers.source import Source
-from ident.runs import TEXT, source_runs
+from ident.runs import TEXT, Found, source_runs
 from sim.catalogue import OUTPUTS
 from sim.errors import InputError
 from sim.frames import Frame
@@ -41,6 +42,8 @@ from sim.vehicle import Vehicle, load_vehicle
 
 __all__ = ["DIRECT", "MOTION", "TEXT", "Campaign", "CampaignFile", "find_campaigns", "read_campaign", "tests"]
 
+# Further files that one message names.
+_SHOWN = 20
 # Columns every run table has, blank where no file gives them.
 _COLUMNS = ("U", "alpha", "beta", "D0", "plane", "n", "J", "rel_sigma", *MOTION, *OUTPUTS, *DIRECT)
 
@@ -59,6 +62,7 @@ class Campaign:
         plus ``file``, ``row`` and ``reduction``.
     digests : SHA-256 of every input file.
     reduced : The time histories that were reduced to runs, for their plots.
+    refused : Those that were left out because their time stamps do not rise.
     """
 
     header: CampaignFile
@@ -66,6 +70,7 @@ class Campaign:
     runs: pd.DataFrame
     digests: dict[str, str] = field(default_factory=dict)
     reduced: tuple[Reduced, ...] = ()
+    refused: tuple[NotRising, ...] = ()
 
 
 @cache
@@ -104,7 +109,7 @@ def _check_words(folder: Path, runs: pd.DataFrame, allowed: dict[str, list[str]]
             raise InputError(place, repr(run[column]), ", ".join(words))
 
 
-def read_runs(folder: Path, header: CampaignFile, vehicle: Vehicle) -> tuple[pd.DataFrame, list[Reduced], list[Path]]:
+def read_runs(folder: Path, header: CampaignFile, vehicle: Vehicle) -> tuple[pd.DataFrame, Found]:
     """The checked runs of every source, in SI and radians but still in the campaign's frame.
 
     Parameters
@@ -114,27 +119,36 @@ def read_runs(folder: Path, header: CampaignFile, vehicle: Vehicle) -> tuple[pd.
 
     Returns
     -------
-    runs, the histories that were reduced, and the files that were read.
+    runs : Those that could be read, in one table.
+    found : The histories that were reduced or refused, and the files that were read.
 
     Raises
     ------
     InputError
         Naming file, row, column, what was found and what is allowed.
     """
-    tables, reduced, paths = [], [], []
+    found = Found()
+    words = {"test": list(tests().index), "part": vehicle.part_names(), "quality": list(header.quality)}
     for source in _sources(folder, header):
-        table, found, read = source_runs(folder, source, header)
-        words = {"test": list(tests().index), "part": vehicle.part_names(), "quality": list(header.quality)}
-        _check_words(folder, table, {**words, "decoupled": ["", "True", "False"]})
-        _check_complete(folder, table)
-        tables.append(table)
-        reduced += found
-        paths += read
-    runs = pd.concat(tables, ignore_index=True)
+        for table in source_runs(folder, source, header, found):
+            _check_words(folder, table, {**words, "decoupled": ["", "True", "False"]})
+            _check_complete(folder, table)
+    runs = pd.concat(found.tables, ignore_index=True) if found.tables else pd.DataFrame()
     for column in _COLUMNS:
         if column not in runs:
             runs[column] = np.nan
-    return runs, reduced, paths
+    return runs, found
+
+
+def _refuse(refused: list[NotRising]) -> None:
+    """One message on every history whose time stamps do not rise."""
+    if not refused:
+        return
+    first, more = refused[0], refused[1:]
+    rest = "; ".join(f"{one.file}, data row {one.row}: {one.found}" for one in more[:_SHOWN])
+    rest = f"; and in {len(more)} more: {rest}" if more else ""
+    rest += f"; ... {len(more) - _SHOWN} more, see ident check" if len(more) > _SHOWN else ""
+    raise InputError(first.where, first.found + rest, first.allowed)
 
 
 def _check_complete(folder: Path, runs: pd.DataFrame) -> None:
@@ -163,12 +177,14 @@ def _check_complete(folder: Path, runs: pd.DataFrame) -> None:
                 raise InputError(f"{place}, column rel_sigma", "nothing", f"a number, or sigma_{bare[0]}_<unit>")
 
 
-def read_campaign(folder: Path) -> Campaign:
+def read_campaign(folder: Path, leave_out: bool = False) -> Campaign:
     """Read and turn one campaign.
 
     Parameters
     ----------
     folder : Folder with ``campaign.toml`` and the files of runs.
+    leave_out : Leave histories whose time stamps do not rise to the quality checks, instead of
+        refusing them all in one message.
 
     Returns
     -------
@@ -185,10 +201,15 @@ def read_campaign(folder: Path) -> Campaign:
     vehicle = load_vehicle(header.vehicle, beside=folder / "campaign.toml")
     frame = header.frame.declared(f"{where}, [frame]")
     _check_named(header, vehicle, where)
-    runs, reduced, paths = read_runs(folder, header, vehicle)
+    runs, found = read_runs(folder, header, vehicle)
+    if not leave_out:
+        _refuse(found.refused)
     digests = {"campaign.toml": hashlib.sha256(raw).hexdigest()}
-    for path in sorted({f for p in paths for f in inputs(p)}):
+    for path in sorted({f for p in found.inputs for f in inputs(p)}):
         digests[path.relative_to(folder).as_posix()] = _digest(path)
+    histories = (tuple(found.reduced), tuple(found.refused))
+    if runs.empty:
+        return Campaign(header, vehicle, run_table({}), digests, *histories)
     runs["copy_of"] = _originals(folder, runs)
     point = frame.vector([header.moment_point.x_m, header.moment_point.y_m, header.moment_point.z_m])
     length = header.scale.ratio * header.scale.length_m
@@ -202,7 +223,7 @@ def read_campaign(folder: Path) -> Campaign:
         run = runs[bad.any(axis=1)].iloc[0]
         place = f"{folder / run['file']}, row {run['row']}"
         raise InputError(place, "a load that is not finite at full scale", "smaller numbers")
-    return Campaign(header, vehicle, runs, digests, tuple(reduced))
+    return Campaign(header, vehicle, runs, digests, *histories)
 
 
 def _check_named(header: CampaignFile, vehicle: Vehicle, where: str) -> None:
@@ -231,7 +252,8 @@ def _originals(folder: Path, runs: pd.DataFrame) -> pd.Series:
     if not repeated.empty:
         run = repeated.iloc[0]
         place = f"{folder / run['file']}, row {run['row']}, column run_id"
-        raise InputError(place, repr(run["run_id"]), "each run_id once a campaign")
+        text = "each run_id once a campaign; match = '(?P<run_id>...)' in [[source]] takes it from the path"
+        raise InputError(place, repr(run["run_id"]), text)
     parent = dict(zip(runs["run_id"], runs["copy_of"], strict=True))
 
     def origin(run: pd.Series) -> str:

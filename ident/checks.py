@@ -117,11 +117,13 @@ def read_labels(folder: Path) -> pd.DataFrame | None:
     found = []
     pattern = re.compile(r"^(?:\[(?P<sheet>[^\]]*)\])?\s*\d+\s*\|(?P<name>[^|]*)\|[^|]*\|(?P<text>[^|]*)$")
     for path in sorted(folder.glob("*.txt")):
-        for row, line in enumerate(path.read_text(encoding="utf-8", errors="replace").splitlines(), start=1):
-            hit = pattern.match(line)
-            if hit:
-                sheet, name, text = (str(hit[k] or "").strip() for k in ("sheet", "name", "text"))
-                found.append((sheet, name, text, path.name, row))
+        # Line by line: a tank file of any size may be a .txt beside the campaign.
+        with path.open(encoding="utf-8", errors="replace") as stream:
+            for row, line in enumerate(stream, start=1):
+                hit = pattern.match(line.rstrip("\n")) if "|" in line else None
+                if hit:
+                    sheet, name, text = (str(hit[k] or "").strip() for k in ("sheet", "name", "text"))
+                    found.append((sheet, name, text, path.name, row))
     return pd.DataFrame(found, columns=["sheet", "column", "description", "file", "row"]) if found else None
 
 
@@ -144,7 +146,7 @@ def check_campaign(campaign: Campaign, folder: Path | None = None) -> list[Findi
     Constant coefficients are identified for it and checked as a table of derivatives.
     """
     evidence = evidence_of(campaign, folder)
-    if campaign.vehicle.term_set != "reduced":
+    if campaign.vehicle.term_set != "reduced" and not campaign.runs.empty:
         evidence = replace(evidence, derivatives=constants(identify(campaign)))
     return run(evidence)
 

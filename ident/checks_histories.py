@@ -26,7 +26,7 @@ def clocks(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
 def replaced_clocks(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
     """Stamps that ``rate_hz`` of the campaign stands in for, and whether it fits them.
 
-    Stamps that do not rise and that nothing stands in for are refused on reading.
+    Stamps that do not rise and that nothing stands in for are those of ``refused_clocks``.
     """
     seen: set[str] = set()
     for one in evidence.histories:
@@ -36,6 +36,14 @@ def replaced_clocks(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
         for found in faults(one.clock, one.file, rule, one.first_row, "info"):
             yield found.with_words("; rate_hz of the campaign stands in for the stamps")
         yield from _rate(one, one.clock, one.rate_hz, rule)
+
+
+@check("time")
+def refused_clocks(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
+    """Histories that were not reduced because their stamps do not rise and nothing stands in for them."""
+    for one in evidence.campaign.refused if evidence.campaign else ():
+        for found in faults(one.clock, one.file, rule, one.first_row):
+            yield found.with_words(f"; not reduced, and refused by ident fit (allowed: {one.allowed})")
 
 
 def _rate(one: Reduced, clock: Clock, rate_hz: float, rule: Rule) -> Iterator[Finding]:

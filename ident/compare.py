@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from sim.database import axis_columns, read_rows
+from sim.database import axis_columns, find_version, own_version, read_rows
 from sim.errors import InputError
 
 if TYPE_CHECKING:
@@ -61,7 +61,7 @@ def difference(db: str, first: int, second: int) -> list[dict[str, Any]]:
     return found
 
 
-def export(db: str, version: int | None, kind: str, folder: Path) -> Path:
+def export(db: str, version: int | None, kind: str, folder: Path) -> dict[str, Any]:
     """Write one version as a plain file.
 
     Parameters
@@ -72,24 +72,38 @@ def export(db: str, version: int | None, kind: str, folder: Path) -> Path:
 
     Returns
     -------
-    The file, ``coefficients_v<version>.<kind>``.
+    What was written, for a program to read: ``file`` (``coefficients_v<version>.<kind>``), format,
+    version and digest, number of rows in all, and for each vehicle with the version they are from.
 
     Raises
     ------
     InputError
-        For a missing database or version, or a folder that is a file.
+        For a missing database or version, a folder that is a file or cannot be written to.
     """
     rows, number = read_rows(db, version)
     if folder.exists() and not folder.is_dir():
         raise InputError(str(folder), "a file", "a folder for the export")
-    folder.mkdir(parents=True, exist_ok=True)
     path = folder / f"coefficients_v{number}.{kind}"
     part = path.with_suffix(".part")
-    if kind == "parquet":
-        rows.to_parquet(part, index=False)
-    elif kind == "csv":
-        rows.to_csv(part, index=False)
-    else:
-        rows.to_json(part, orient="records", indent=1, double_precision=15)
-    part.replace(path)
-    return path
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        if kind == "parquet":
+            rows.to_parquet(part, index=False)
+        elif kind == "csv":
+            rows.to_csv(part, index=False)
+        else:
+            rows.to_json(part, orient="records", indent=1, double_precision=15)
+        part.replace(path)
+    except OSError as error:
+        raise InputError(str(path), f"cannot be written: {error.strerror}", "a folder you may write to") from error
+    own = {name: own_version(db, name, number) for name in rows["vehicle"].unique()}
+    return {
+        "file": str(path),
+        "format": kind,
+        "database": {"path": db, "version": number, "digest": find_version(db, number).digest},
+        "rows": len(rows),
+        "vehicles": [
+            {"vehicle": name, "version": v.number, "digest": v.digest, "rows": int(rows["vehicle"].eq(name).sum())}
+            for name, v in own.items()
+        ],
+    }

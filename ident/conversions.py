@@ -15,7 +15,7 @@ import numpy as np
 import pandas as pd
 
 from ident.campaign_file import CampaignFile, Tare
-from ident.quantities import PRIMED, factor
+from ident.quantities import PRIMED, TAKEN, factor
 from sim.catalogue import ACCELERATIONS, OUTPUTS
 from sim.errors import InputError
 from sim.forces import body_velocity
@@ -100,9 +100,9 @@ def dimensional(runs: pd.DataFrame, primed: set[str], name: str, header: Campaig
 def turn(runs: pd.DataFrame, frame: Frame, angles: str) -> pd.DataFrame:
     """Turn loads, rates, accelerations and levers to the program frame, drift to flight sign."""
     turned = runs.copy()
-    for quantity in (*OUTPUTS, *MOTION, "x", "y", "z"):
+    for quantity in (*OUTPUTS, *MOTION, "x", "y", "z", *(TAKEN + o for o in OUTPUTS)):
         if quantity in turned:
-            turned[quantity] = turned[quantity] * frame.sign(quantity)
+            turned[quantity] = turned[quantity] * frame.sign(quantity.removeprefix(TAKEN))
     if angles == "ittc" and "beta" in turned:
         turned["beta"] = -turned["beta"]
     return turned
@@ -175,6 +175,9 @@ def move_moments(runs: pd.DataFrame, point: list[float]) -> pd.DataFrame:
                 place = f"{run['file']}, row {run['row']}, column {force}"
                 raise InputError(place, "nothing", f"a number: moving {moment} to the vehicle's origin needs {force}")
             moved[moment] = moved[moment] + arm * runs[force]
+            if TAKEN + force in runs:
+                off = moved[TAKEN + moment].fillna(0.0) if TAKEN + moment in moved else 0.0
+                moved[TAKEN + moment] = off + arm * runs[TAKEN + force].fillna(0.0)
             if f"s_{moment}" in moved and f"s_{force}" in moved:
                 own, carried = moved[f"s_{moment}"], arm * runs[f"s_{force}"].fillna(0.0)
                 moved[f"s_{moment}"] = (own**2 + carried**2) ** 0.5
@@ -215,9 +218,17 @@ def without_inertia(runs: pd.DataFrame, header: CampaignFile, frame: Frame) -> p
     out = runs.copy()
     for output, own in zip(OUTPUTS, np.hstack([force, moment]).T, strict=True):
         # A relative error is one of what the balance measured, inertia included.
-        out[f"size_{output}"] = out[output].abs().where(chosen)
+        out[f"size_{output}"] = as_measured(out, output).where(chosen)
         out[output] = out[output] + np.where(chosen, own, 0.0)
     return out
+
+
+def as_measured(runs: pd.DataFrame, output: str) -> pd.Series:
+    """Size that a relative error is of: the load, or total and part in squares where a part was taken off."""
+    if TAKEN + output not in runs:
+        return runs[output].abs()
+    taken = runs[TAKEN + output].fillna(0.0)
+    return ((runs[output] + taken) ** 2 + taken**2) ** 0.5
 
 
 def _product_signs(frame: Frame) -> tuple[int, int, int]:
@@ -246,7 +257,7 @@ def whole_model(runs: pd.DataFrame, header: CampaignFile) -> pd.DataFrame:
             raise InputError(place, f"{run[name]:g}", f"zero: a half model ({plane}) is tested in symmetric flow")
     for output in OUTPUTS:
         keep = 2.0 if output in _DOUBLED[plane] else np.nan
-        for column in (output, f"s_{output}", f"size_{output}"):
+        for column in (output, f"s_{output}", f"size_{output}", TAKEN + output):
             if column in out:
                 out[column] = out[column] * keep
     return out
@@ -257,7 +268,7 @@ def to_full_scale(runs: pd.DataFrame, ratio: float) -> pd.DataFrame:
     powers: dict[str, float] = {"U": 0.5, "D0": 1, "R0": 1, "n": -0.5, "x": 1, "y": 1, "z": 1}
     powers |= dict.fromkeys(("p", "q", "r"), -0.5) | dict.fromkeys(("pdot", "qdot", "rdot"), -1)
     powers |= {o: 3 if o in "XYZ" else 4 for o in OUTPUTS}
-    powers |= {f"{kind}_{o}": powers[o] for o in OUTPUTS for kind in ("s", "size")}
+    powers |= {f"{kind}{o}": powers[o] for o in OUTPUTS for kind in ("s_", "size_", TAKEN)}
     scaled = runs.copy()
     for name, power in powers.items():
         if name in scaled:
@@ -284,7 +295,7 @@ def standard_errors(runs: pd.DataFrame, header: CampaignFile, length: float) -> 
     dynamic = out["U"].fillna(0.0) ** 2 + rate2 * length**2
     reduced = out["reduction"] != ""
     for name in (*OUTPUTS, *DIRECT):
-        size = out[name].abs()
+        size = as_measured(out, name)
         if f"size_{name}" in out:
             size = size.where(out[f"size_{name}"].isna(), out[f"size_{name}"])
         prime = (size / dynamic).where(dynamic > 0) if name in OUTPUTS else size

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ident import condense, reduction
 from ident.clock import Clock
-from ident.quantities import HARMONICS
+from ident.quantities import HARMONICS, TAKEN
 from ident.readers.source import MOTIONS, Reduction
 from sim.catalogue import OUTPUTS
 from sim.errors import InputError
@@ -47,6 +47,24 @@ class Channels:
     quantities: list[str]
     pieces: Pieces
     first_row: int = 2
+
+
+class NotRising(InputError):
+    """A history whose time stamps do not rise, with nothing to stand in for them.
+
+    Attributes
+    ----------
+    file : Of the run.
+    row : Of the data, where time first does not rise.
+    clock : All of its stamps.
+    first_row : File row of the first stamp.
+    """
+
+    def __init__(self, channels: Channels, clock: Clock, at: int, found: str) -> None:
+        text = "a time that rises; or rate_hz in [source.reduction] where stamps have too few digits"
+        super().__init__(f"{channels.path}, data row {at + 1}, column time", found, text)
+        self.file, self.row = channels.path.name, at + 1
+        self.clock, self.first_row = clock, channels.first_row
 
 
 @dataclass(frozen=True)
@@ -103,10 +121,10 @@ def _timed(channels: Channels, rule: Reduction, clock: Clock | None = None) -> I
         step = np.diff(time, prepend=last)
         if (step <= 0.0).any():
             i = int(np.flatnonzero(step <= 0.0)[0])
-            place = f"{channels.path}, data row {count + i + 1}, column time"
-            text = "a time that rises; or rate_hz in [source.reduction] where stamps have too few digits"
-            found = f"{time[i]:g} s after {time[i - 1] if i else last:g} s{_in_all(channels, at)}"
-            raise InputError(place, found, text)
+            whole = _whole(channels, at)
+            faults = whole.repeats + whole.backs
+            more = f"; {faults} of {whole.samples} stamps repeat or step back" if faults > 1 else ""
+            raise NotRising(channels, whole, count + i, f"{time[i]:g} s after {time[i - 1] if i else last:g} s{more}")
         count, last = count + len(piece), float(time[-1])
         keep = np.ones(len(time), dtype=bool)
         if rule.start_s is not None:
@@ -117,13 +135,12 @@ def _timed(channels: Channels, rule: Reduction, clock: Clock | None = None) -> I
             yield time[keep], piece[keep][:, others]
 
 
-def _in_all(channels: Channels, at: int | None) -> str:
-    """How many stamps of a file do not rise, where it is more than one."""
+def _whole(channels: Channels, at: int | None) -> Clock:
+    """All stamps of a history."""
     clock = Clock()
     for piece in channels.pieces() if at is not None else ():
         clock.feed(piece[:, at])
-    count = clock.repeats + clock.backs
-    return f"; {count} of {clock.samples} stamps repeat or step back" if count > 1 else ""
+    return clock
 
 
 def reduce(channels: Channels, rule: Reduction, run_id: str, frequency: float | None) -> tuple[dict[str, Any], Reduced]:
@@ -145,7 +162,7 @@ def reduce(channels: Channels, rule: Reduction, run_id: str, frequency: float | 
     Raises
     ------
     InputError
-        Without time, loads or enough samples, or for a time that does not rise.
+        Without time, loads or enough samples; ``NotRising`` for a time that does not rise.
     """
     names = [q for q in channels.quantities if q != "time"]
     loads = [q for q in names if q in OUTPUTS]
@@ -208,7 +225,7 @@ def _harmonic_values(names: list[str], fit: reduction.Fitted, frequency: float) 
     covariance = {}
     for c_, name in enumerate(names):
         own = turn @ fit.values[:, c_]
-        if name in OUTPUTS:
+        if name.removeprefix(TAKEN) in OUTPUTS:
             values |= {f"{name}_{h}": float(v) for h, v in zip(HARMONICS, own, strict=True)}
             covariance[name] = turn @ fit.covariance[c_] @ turn.T
         elif name != "displacement":
@@ -263,12 +280,12 @@ def states(run: dict[str, Any], rule: Reduction, frame: Frame, ittc: bool, where
         usual = _STEADY_TEST.get(rule.motion, "rotating_arm")
         state["test"] = (run.get("test") or usual) if at_velocity else "acceleration"
         weights = phase_row(theta)
-        for output in OUTPUTS:
+        for output in (*OUTPUTS, *(TAKEN + o for o in OUTPUTS)):
             parts = np.array([run.get(f"{output}_{h}", math.nan) for h in HARMONICS], dtype=float)
             if np.isnan(parts).all():
                 continue
             state[output] = float(weights @ np.nan_to_num(parts))
-            if output in run.get("covariance", {}):
+            if output in OUTPUTS and output in run.get("covariance", {}):
                 variance = float(weights @ run["covariance"][output] @ weights)
                 state[f"s_{output}"] = math.sqrt(max(variance, 0.0))
         for name_ in ("covariance", "frequency", "amplitude", "displacement"):

@@ -38,7 +38,8 @@ def conversions(campaign: Campaign) -> dict[str, Any]:
         inertia |= {"runs": int(runs["part"].isin(header.inertia.parts).sum())}
     return {
         "sources": [
-            {k: one[k] for k in ("files", "rows", "normalisation", "rho_inf", "reduction")} for one in data["source"]
+            {k: one[k] for k in ("files", "rows", "normalisation", "rho_inf", "reduction", "subtract")}
+            for one in data["source"]
         ],
         "histories": [{"run_id": r.run_id, "file": r.file, "reduction": r.words()} for r in campaign.reduced],
         "tare": tares,
@@ -73,6 +74,7 @@ def steps(stored: dict[str, Any]) -> list[tuple[str, str]]:
         return []
     return [
         ("Files", _sources(stored["sources"])),
+        *_subtract(stored["sources"]),
         *_reduction(stored["sources"], stored["histories"]),
         ("Tare", _tare(stored["tare"])),
         *_frame(stored["frame"]),
@@ -94,6 +96,17 @@ def _sources(sources: list[dict[str, Any]]) -> str:
         text += f", dimensionless by {one['normalisation']}" if one["normalisation"] else ""
         texts.append(text + (f", rhoInf {one['rho_inf']:g}" if one["rho_inf"] else ""))
     return "; ".join(texts)
+
+
+def _subtract(sources: list[dict[str, Any]]) -> list[tuple[str, str]]:
+    """What was measured of parts and taken off the total; a version from before has none."""
+    texts = []
+    for source in sources:
+        for one in source.get("subtract", []):
+            columns = ", ".join(f"{name} ({load})" for name, load in one["columns"].items())
+            at = f", at ({', '.join(f'{x:g}' for x in one['at_m'])}) m" if one["at_m"] else ""
+            texts.append(f"{source['files']}: {one['what']}, {one['factor']:g} times {columns}{at} ({one['source']})")
+    return [("Parts taken off", "; ".join(texts))] if texts else []
 
 
 def _reduction(sources: list[dict[str, Any]], histories: list[dict[str, str]]) -> list[tuple[str, str]]:

@@ -7,6 +7,7 @@ have the dimension of the quantity.
 
 from __future__ import annotations
 
+import math
 import re
 from dataclasses import dataclass
 from functools import cache
@@ -21,6 +22,8 @@ from sim.errors import InputError
 # A load, its standard error, and what an oscillatory test is reduced to: mean, then in
 # phase and in quadrature with the displacement, first to third harmonic.
 HARMONICS = ("mean", "in", "out", "in2", "out2", "in3", "out3")
+# Before a load: what ``[[source.subtract]]`` took off it.
+TAKEN = "taken_"
 # Dimensionless input needs a named normalisation for these.
 PRIMED = {
     **dict.fromkeys(("X", "Y", "Z"), "force"),
@@ -31,6 +34,7 @@ PRIMED = {
 }
 _BRACKET = re.compile(r"^(?P<name>.*?)\s*(?:\[(?P<square>[^\[\]]*)\]|\((?P<round>[^()]*)\))$", re.DOTALL)
 _PART = re.compile(r"([A-Za-zµ]+)(?:(?:\*\*|\^)?(-?[1-4]))?")
+_RAISED = str.maketrans("⁻¹²³⁴", "-1234")
 _ANGLES = {"radian", "degree", "turn", "grade", "arcminute", "arcsecond", "milliradian"}
 _NO_UNIT = ("", "-", "1", "/")
 
@@ -109,7 +113,8 @@ def split(header: str) -> tuple[str, str | None]:
 
 def _clean(unit: str) -> str | None:
     """A unit in the one spelling handed to pint, or None when it is not made of units."""
-    text = unit.replace("°", "deg").replace("²", "2").replace("³", "3")
+    text = re.sub(r"(?<=[A-Za-z])-(?=[A-Za-z])", "*", unit)
+    text = text.replace("°", "deg").replace("º", "deg").translate(_RAISED)
     text = re.sub(r"[·⋅.]", "*", text.replace("^", "**"))
     text = re.sub(r"(?<![*/])\s+(?![*/])", "*", text.strip())
     parts = [p.strip() for p in re.split(r"(?<!\*)\*(?!\*)|(/)", text) if p is not None]
@@ -174,6 +179,29 @@ def allowed_units(quantity: str) -> str:
     return (", ".join(listed) + more) if listed else "no unit: it is dimensionless"
 
 
+def _contradiction(quantity: str, header: str, unit: str, place: str) -> None:
+    """Refuse a header whose brackets hold another unit than the declaration; words in round ones are no unit."""
+    stated = split(header)[1]
+    if not quantity or stated in (None, "", unit) or (header.rstrip().endswith(")") and not is_unit(stated or "")):
+        return
+    there, here = factor(quantity, stated or ""), factor(quantity, unit)
+    if there is None or here is None or not math.isclose(there, here, rel_tol=1e-12):
+        raise InputError(place, f"unit {stated!r}, declared as {unit!r}", "one unit: leave it out of the declaration")
+
+
+def is_unit(text: str) -> bool:
+    """Whether some quantity has this unit, or pint knows it, capitals or not."""
+    if text in _NO_UNIT or any(text in choices for choices in units().values()):
+        return True
+    import pint
+
+    cleaned = _clean(text) if len(text) <= 40 else None
+    try:
+        return cleaned is not None and bool(_registry().parse_units(cleaned, case_sensitive=False))
+    except (pint.errors.PintError, ValueError, TypeError, AttributeError, ArithmeticError):
+        return False
+
+
 def column(header: str, declared: str | None, where: str) -> Column:
     """What a column is, from its header and what the campaign declares it to be.
 
@@ -199,11 +227,7 @@ def column(header: str, declared: str | None, where: str) -> Column:
     if declared is not None and unit is None:
         unit = split(header)[1]
     elif declared is not None:
-        stated = split(header)[1]
-        if stated not in (None, "", unit):
-            raise InputError(
-                place, f"unit {stated!r}, declared as {unit!r}", "one unit: leave it out of the declaration"
-            )
+        _contradiction(owner(name.removesuffix("'")), header, unit or "", place)
     if name.endswith("'") and owner(name[:-1]) in PRIMED:
         name, unit = name[:-1], "-" if unit is None else unit
     known = owner(name)

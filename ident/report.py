@@ -15,7 +15,7 @@ from typing import Any
 import pandas as pd
 
 from ident.derivatives import checks, derivatives
-from ident.findings import spans
+from ident.findings import SEVERITIES, spans
 from ident.notes import group_unused, group_warnings
 from ident.provenance import steps
 from ident.report_figures import draw_figures, equations, quality_colours
@@ -188,9 +188,8 @@ def _errata() -> list[dict[str, str]]:
         return list(csv.DictReader(stream))
 
 
-def _content(db: str, number: int, vehicle: Vehicle, rows: pd.DataFrame) -> dict[str, Any]:
+def _content(db: str, number: int, vehicle: Vehicle, rows: pd.DataFrame, commit: Version) -> dict[str, Any]:
     """Everything the template shows."""
-    commit = own_version(db, vehicle.name, number)
     vocabulary = _vocabulary(commit.metadata, rows)
     colours = quality_colours(q["word"] for q in vocabulary)
     coverage = _coverage(vehicle, rows, {q["word"]: q["factor"] or 1.0 for q in vocabulary})
@@ -221,6 +220,13 @@ def _content(db: str, number: int, vehicle: Vehicle, rows: pd.DataFrame) -> dict
     }
 
 
+def _severities(findings: list[dict[str, Any]] | None) -> dict[str, int] | None:
+    """Number of quality findings by severity; None where the commit holds none of them."""
+    if findings is None:
+        return None
+    return {s: sum(f.get("severity") == s for f in findings) for s in reversed(SEVERITIES)}
+
+
 def _write(path: Path, text: str) -> None:
     """The whole file or nothing."""
     temporary = path.with_name(f".{path.name}.{os.getpid()}")
@@ -235,6 +241,11 @@ def _write(path: Path, text: str) -> None:
 
 
 def write_report(db: str, version: int | None, out: Path, vehicle: str = "bb2") -> Path:
+    """``make_report``, for its file alone."""
+    return Path(make_report(db, version, out, vehicle)["file"])
+
+
+def make_report(db: str, version: int | None, out: Path, vehicle: str = "bb2") -> dict[str, Any]:
     """Write the report of one vehicle at one database version.
 
     Parameters
@@ -246,7 +257,8 @@ def write_report(db: str, version: int | None, out: Path, vehicle: str = "bb2") 
 
     Returns
     -------
-    Path of ``<vehicle>_v<version>.html``: images, style and all in the one file.
+    What was written, for a program to read: ``file`` (``<vehicle>_v<version>.html``: images,
+    style and all in the one file), vehicle, version and digest, and how much it shows.
 
     Raises
     ------
@@ -261,7 +273,20 @@ def write_report(db: str, version: int | None, out: Path, vehicle: str = "bb2") 
     templates = Templates(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
     templates.filters["spans"] = spans
     source = (files("ident") / "templates" / "report.html.j2").read_text("utf-8")
-    page = templates.from_string(source).render(_content(db, number, boat, rows))
+    commit = own_version(db, boat.name, number)
+    content = _content(db, number, boat, rows, commit)
+    page = templates.from_string(source).render(content)
     path = Path(out) / f"{re.sub(r'[^A-Za-z0-9._-]', '_', boat.name)}_v{number}.html"
     _write(path, page)
-    return path
+    return {
+        "file": str(path),
+        "vehicle": boat.name,
+        "database": {"path": db, "version": number, "digest": commit.digest},
+        "rows": len(rows),
+        "coefficients": len(content["present"]),
+        "absent": [row["symbol"] for row in content["absent"]],
+        "signs": {"expected": content["signs"]["passed"], "of": len(content["signs"]["rows"])},
+        "findings": _severities(content["checks"]),
+        "warnings": len(_stored(commit.metadata, "warnings", [])),
+        "unused": len(_stored(commit.metadata, "unused", [])),
+    }

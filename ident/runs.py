@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -12,12 +13,13 @@ import pandas as pd
 
 from ident.campaign_file import CampaignFile
 from ident.conversions import DIRECT, MOTION, dimensional, quantity_of
-from ident.histories import Channels, Pieces, Reduced, reduce, states
+from ident.histories import Channels, NotRising, Pieces, Reduced, reduce, states
 from ident.quantities import Column, column, owner, suffixed
 from ident.readers import matching, open_sheet, openfoam, reader_of
-from ident.readers.source import Source
+from ident.readers.source import NO_COLUMNS, Source
 from ident.readers.table import Sheet, columns_of, run_cells
 from ident.readers.text import LARGEST, Dialect
+from ident.subtract import off_samples, off_table, taken_columns
 from sim.catalogue import OUTPUTS
 from sim.errors import InputError
 
@@ -29,20 +31,37 @@ _STATES = ("U", "alpha", "beta", "D0", "plane", "n", "J", *MOTION)
 _SLACK = 1e-9
 
 
-def source_runs(folder: Path, source: Source, header: CampaignFile) -> tuple[pd.DataFrame, list[Reduced], list[Path]]:
-    """All runs of one source.
+@dataclass
+class Found:
+    """What some sources gave.
+
+    Attributes
+    ----------
+    tables : Runs, a table a file: text columns, quantities in SI, ``file``, ``row``, ``reduction``.
+    reduced : The histories that were reduced, in order.
+    refused : Those whose time stamps do not rise.
+    inputs : Paths that were read.
+    """
+
+    tables: list[pd.DataFrame] = field(default_factory=list)
+    reduced: list[Reduced] = field(default_factory=list)
+    refused: list[NotRising] = field(default_factory=list)
+    inputs: list[Path] = field(default_factory=list)
+
+
+def source_runs(folder: Path, source: Source, header: CampaignFile, found: Found) -> list[pd.DataFrame]:
+    """Add all runs of one source to what was found.
 
     Parameters
     ----------
     folder : The campaign's.
     source : One ``[[source]]``.
     header : The campaign, for frame, scale and density.
+    found : Its lists grow.
 
     Returns
     -------
-    runs : Text columns, quantities in SI, ``file``, ``row``, ``reduction``.
-    reduced : The histories that were reduced, in order.
-    inputs : Paths that were read.
+    The tables that were added.
 
     Raises
     ------
@@ -52,16 +71,24 @@ def source_runs(folder: Path, source: Source, header: CampaignFile) -> tuple[pd.
     paths = matching(folder, source)
     where = str(folder / "campaign.toml")
     tables: list[pd.DataFrame] = []
-    reduced: list[Reduced] = []
     for path in paths:
         stated = constants(folder, path, source)
-        if source.rows == "history":
-            table, found = _from_histories(path, source, header, stated, where)
-            reduced += found
-        else:
-            table = _from_table(path, source, header, stated, where)
-        tables.append(outside_excluded(table, source, where))
-    return pd.concat(tables, ignore_index=True), reduced, paths
+        name = path.relative_to(folder).as_posix()
+        try:
+            if source.rows == "history":
+                table, reduced = _from_histories(path, source, header, stated, where)
+                found.reduced += [replace(one, file=name) for one in reduced]
+            else:
+                table = _from_table(path, source, header, stated, where)
+        except NotRising as error:
+            # Every such file is to be named, not the first alone.
+            error.file = name
+            found.refused.append(error)
+            continue
+        tables.append(outside_excluded(table.assign(file=name), source, where))
+    found.tables += tables
+    found.inputs += paths
+    return tables
 
 
 def outside_excluded(table: pd.DataFrame, source: Source, where: str) -> pd.DataFrame:
@@ -178,6 +205,11 @@ def _from_table(path: Path, source: Source, header: CampaignFile, stated: Stated
         columns.setdefault(name, "")
     out = pd.DataFrame({**columns, "file": path.name, "row": rows, "reduction": ""}, index=range(len(rows)))
     out = dimensional(out, primed, source.normalisation, header, where)
+    if source.subtract:
+        totals = {q for q in columns if owner(q) in OUTPUTS and not q.startswith(("s_", "sigma_"))}
+        taken = taken_columns(sheet, source, header, totals, where)
+        cells = pd.DataFrame({i: _numbers(sheet, table.iloc[:, t.at], rows, t.kind) for i, t in enumerate(taken)})
+        out = off_table(out, taken, cells, source, header, sheet)
     return _spread(out, source, header, str(path)) if source.reduction else out
 
 
@@ -233,7 +265,8 @@ def _from_histories(
     reduced = []
     for part, channels in _channels(path, source, header, numbers, where):
         own = dict(words) | ({"part": part} if part else {})
-        name = own.get("run_id") or path.stem
+        # Of a folder "drift_2.5" all is its name.
+        name = own.get("run_id") or (path.name if path.is_dir() else path.stem)
         own["run_id"] = f"{name}-{part}" if part else name
         frequency = numbers.get("frequency", rule.frequency_hz)
         values, one = reduce(channels, rule, own["run_id"], frequency)
@@ -258,6 +291,8 @@ def _channels(
 ) -> Iterator[tuple[str, Channels]]:
     """The histories of a path: part (empty where the campaign names it) and channels."""
     if reader_of(path, source) == "openfoam":
+        if source.subtract:
+            raise InputError(f"{where}, key source.subtract", "an OpenFOAM case", NO_COLUMNS)
         yield from _openfoam(path, source, header, where)
         return
     sheet = open_sheet(path, source)
@@ -268,13 +303,20 @@ def _channels(
     primed = {k.quantity for _, k in wanted if k.primed}
     one = pd.DataFrame([{**dict.fromkeys(names, 1.0), "U": numbers.get("U"), "file": path.name, "row": 1}])
     scales = dimensional(one, primed, source.normalisation, header, where).iloc[0]
-    factors = np.array([float(scales[k.quantity]) if k.primed else k.factor for _, k in wanted])
+    factors = [float(scales[k.quantity]) if k.primed else k.factor for _, k in wanted]
+    taken = taken_columns(sheet, source, header, {n for n in names if n in OUTPUTS}, where)
+    for one_taken in taken:
+        own = pd.DataFrame([{one_taken.kind.quantity: 1.0, "U": numbers.get("U"), "file": path.name, "row": 1}])
+        part = {one_taken.kind.quantity} if one_taken.kind.primed else set()
+        made = dimensional(own, part, source.normalisation, header, where).iloc[0]
+        factors.append(float(made[one_taken.kind.quantity]) * one_taken.kind.factor)
+    channels, matrix = off_samples(names, taken, np.array(factors))
 
     def pieces() -> Iterator[np.ndarray]:
-        for block in sheet.numbers([i for i, _ in wanted]):
-            yield block * factors
+        for block in sheet.numbers([*(i for i, _ in wanted), *(t.at for t in taken)]):
+            yield block @ matrix if taken else block * factors
 
-    yield "", Channels(path, names, pieces, sheet.first_row)
+    yield "", Channels(path, channels, pieces, sheet.first_row)
 
 
 def _openfoam(path: Path, source: Source, header: CampaignFile, where: str) -> Iterator[tuple[str, Channels]]:
@@ -296,6 +338,10 @@ def _openfoam(path: Path, source: Source, header: CampaignFile, where: str) -> I
     for name in source.parts:
         if name not in found:
             raise InputError(str(path), f"no function object {name!r}", ", ".join(found))
+    twice = [part for part in source.parts.values() if list(source.parts.values()).count(part) > 1]
+    if twice:
+        text = "one function object a part: it sums the patches that it is given"
+        raise InputError(f"{where}, key source.parts", f"{twice[0]!r} twice", text)
     chosen = source.parts or (dict.fromkeys(found, "") if len(found) == 1 else {})
     if not chosen:
         text = f"[source.parts] naming the part of each: {', '.join(found)}"

@@ -270,9 +270,10 @@ def test_empty_run_file_is_named(tmp_path, text):
     assert_refused(write(tmp_path, runs=text), "drift.csv")
 
 
-@pytest.mark.parametrize("encoding", ["utf-16", "latin-1"])
+@pytest.mark.parametrize("encoding", ["utf-16-le", "utf-16-be", "latin-1", "cp932"])
 def test_run_file_in_another_encoding_is_named(tmp_path, encoding):
-    assert_refused(write(tmp_path, runs=RUNS.replace("book", "caf\xe9").encode(encoding)), "drift.csv", "UTF-8")
+    text = RUNS.replace("book", "\u00b1" if encoding == "cp932" else "caf\xe9")
+    assert_refused(write(tmp_path, runs=text.encode(encoding)), "drift.csv", "encoding", "in [[source]]")
 
 
 def test_spreadsheet_byte_order_mark_and_line_ends_are_accepted(tmp_path):

@@ -14,7 +14,22 @@ import numpy as np
 import pandas as pd
 import pytest
 from click.testing import CliRunner
-from made_campaigns import CONSTANTS, STEADY, campaign, history
+from made_campaigns import (
+    BETA,
+    CONSTANTS,
+    MEANS,
+    SAMPLES,
+    SERIES,
+    STEADY,
+    TIME,
+    VALUES,
+    assert_means,
+    assert_values,
+    campaign,
+    history,
+    read,
+    tidy,
+)
 
 from ident.campaign import read_campaign
 from ident.cli import main
@@ -23,27 +38,6 @@ from ident.quantities import factor, table
 from ident.readers.source import Source
 from ident.store import database_rows
 from sim.errors import InputError
-
-COLUMNS = ["X", "Y", "N"]
-VALUES = np.array([[-1234.5, 2750.25, 12500.0], [-1180.0, 5600.5, 25250.0], [-1100.25, 8450.0, 38000.0]])
-BETA = [2.0, 4.0, 6.0]
-RUNS = CONSTANTS.replace('beta = "5 deg"\n', "") + "rel_sigma = 0.05\n"
-
-
-def tidy(keys: str = "", columns: str = "", constants: str = RUNS) -> str:
-    return f'[[source]]\nfiles = "runs.*"\n{keys}\n[source.columns]\n{columns}\n{constants}'
-
-
-def read(folder, text: str | bytes, source: str, name: str = "runs.csv", **tables):
-    campaign(folder, source, **tables)
-    (folder / name).write_bytes(text if isinstance(text, bytes) else text.encode())
-    return read_campaign(folder).runs
-
-
-def assert_values(runs) -> None:
-    np.testing.assert_allclose(runs[COLUMNS].to_numpy(), VALUES, rtol=1e-12)
-    np.testing.assert_allclose(np.degrees(runs["beta"]), BETA, rtol=1e-12)
-    np.testing.assert_allclose(runs["U"], 2.0)
 
 
 def body(form, delimiter: str = ",") -> str:
@@ -178,19 +172,6 @@ def test_the_table_of_quantities_agrees_with_pint():
 
 
 # -- time histories --------------------------------------------------------------------------
-
-TIME = np.arange(400) * 0.05
-SERIES = np.column_stack([np.full(400, v) for v in VALUES[0]]) + np.random.default_rng(3).standard_normal((400, 3))
-MEANS = SERIES.mean(axis=0)
-SAMPLES = [(t, *row) for t, row in zip(TIME.tolist(), SERIES.tolist(), strict=True)]
-
-
-def assert_means(runs) -> None:
-    assert len(runs) == 1
-    np.testing.assert_allclose(runs[COLUMNS].to_numpy()[0], MEANS, rtol=1e-6)
-    np.testing.assert_allclose(runs[["s_X", "s_Y", "s_N"]].to_numpy()[0], 1.0 / np.sqrt(400), rtol=0.3)
-    assert runs["beta"].iloc[0] == pytest.approx(np.radians(5.0))
-
 
 STAR = (
     '"Iteration","Physical Time: Physical Time (s)","Drag Monitor: Drag Monitor (N)",'
@@ -343,7 +324,7 @@ def test_examples_of_the_documentation_fit_the_schema():
     """Every TOML block of docs/readers.md is a source that is accepted."""
     text = (Path(__file__).parents[1] / "docs" / "readers.md").read_text("utf-8")
     examples = [block.split("```")[0] for block in text.split("```toml\n")[1:]]
-    assert len(examples) == 5
+    assert len(examples) == 6
     for example in examples:
         data = tomllib.loads(example)["source"][0]
         history_ = data.get("rows") == "history" and "reduction" not in data

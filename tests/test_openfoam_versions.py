@@ -166,7 +166,9 @@ COEFFICIENTS = "# Force coefficients\n# liftDir : (0 1 0)\n# Time\tCd\tCs\tCl\n0
         ("forces.dat", VERSIONS["Foundation 11"]["forces.dat"].replace(COFR, ""), "CofR"),
         ("forces.dat", VERSIONS["Foundation 11"]["forces.dat"].replace("(5.0", "(5.0.0"), "CofR"),
         ("forces.dat", VERSIONS["Foundation 11"]["forces.dat"].replace(P2, P3), "cells"),
-        ("forces.dat", VERSIONS["Foundation 11"]["forces.dat"][:-20], "cut short"),
+        ("forces.dat", VERSIONS["Foundation 11"]["forces.dat"].replace("))\n", "\n", 1), "cut short"),
+        ("forces.dat", VERSIONS["Foundation 11"]["forces.dat"][:-20] + "\n", "cut short"),
+        ("forces.dat", "", "no line '# Time"),
         ("forces.dat", "# Forces\n" + COFR + f"# Time forces{P2}\tmoments{P2}\n", "no rows"),
         ("force.dat", VERSIONS["OpenCFD v2212"]["force.dat"], "force.dat"),
     ],
@@ -177,6 +179,75 @@ def test_a_header_nobody_listed_is_refused_with_its_place(tmp_path, name, text, 
         read(tmp_path)
     assert words in str(caught.value)
     assert caught.value.allowed
+
+
+OPENCFD = ["OpenCFD v1912", "OpenCFD v2212, porous"]
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_line_ends_spacing_and_own_comments_change_nothing(tmp_path, version):
+    """Copied by way of Windows, without the last line end, and with a line of one's own on top."""
+    whole = read(written(tmp_path / "a", VERSIONS[version]))
+    spaced = {
+        k: "# copied from the cluster\n"
+        + t.replace("# CofR          :", "#   CofR:").replace("# Time          ", "#Time ")
+        for k, t in VERSIONS[version].items()
+    }
+    for k, change in enumerate(
+        [lambda t: t.replace("\n", "\r\n"), lambda t: t.rstrip("\n"), lambda t: t.replace("\n", "\n\n# restarted\n", 5)]
+    ):
+        found = read(written(tmp_path / str(k), {n: change(t) for n, t in spaced.items()}))
+        np.testing.assert_array_equal(found, whole)
+
+
+@pytest.mark.parametrize("cut", [-3, -30, -75])
+@pytest.mark.parametrize("version", VERSIONS)
+def test_a_run_that_is_being_written_is_read_to_its_last_whole_row(tmp_path, version, cut):
+    """Wherever the file breaks off, in the exponent of the last number too; the restart brings the row again."""
+    whole = read(written(tmp_path / "a", VERSIONS[version]))
+    files = {k: t[:cut] for k, t in VERSIONS[version].items()}
+    np.testing.assert_array_equal(read(written(tmp_path / "b", files)), whole[: -1 if cut < -2 else None])
+    later = {
+        k: "".join(r for r in t.splitlines(True) if r[0] == "#" or float(r.split("(")[0].split()[0]) > 1.0)
+        for k, t in VERSIONS[version].items()
+    }
+    np.testing.assert_array_equal(read(written(tmp_path / "b", later, "1")), whole)
+
+
+@pytest.mark.parametrize("behind", ["force.dat", "moment.dat"])
+@pytest.mark.parametrize("version", OPENCFD)
+def test_one_of_two_files_a_row_behind(tmp_path, version, behind):
+    whole = read(written(tmp_path / "a", VERSIONS[version]))
+    files = {k: t if k != behind else t[: t.rindex("\n", 0, -1) + 1] for k, t in VERSIONS[version].items()}
+    np.testing.assert_array_equal(read(written(tmp_path / "b", files)), whole[:-1])
+    files[behind] = files[behind][: files[behind].rindex("\n", 0, -1) + 1]
+    with pytest.raises(InputError, match="no row in the other file"):
+        read(written(tmp_path / "b", files))
+
+
+@pytest.mark.parametrize("version", ["Foundation 11", *OPENCFD])
+def test_a_restart_that_ended_before_its_first_row_is_passed_over(tmp_path, version):
+    whole = read(written(tmp_path, VERSIONS[version]))
+    headers = {k: "".join(r for r in t.splitlines(True) if r[0] == "#") for k, t in VERSIONS[version].items()}
+    written(tmp_path, headers, "1.5")
+    written(tmp_path, dict.fromkeys(headers, ""), "1e-05")
+    np.testing.assert_array_equal(read(tmp_path), whole)
+
+
+def test_cases_with_dots_in_their_names_are_runs_of_their_own(tmp_path):
+    for drift in ("2.0", "2.5"):
+        for name in ("forces.hull", "forces.rudder"):
+            written(tmp_path / f"drift_{drift}" / "postProcessing" / name, VERSIONS["Foundation 11"])
+    keys = "rho_inf = 1.0\nmatch = 'drift_(?P<beta_deg>-?[0-9.]+)$'\n"
+    parts = '[source.parts]\n"forces.hull" = "hull"\n"forces.rudder" = "stern_plane_1"\n'
+    state = STATE.replace('beta = "-8 deg"\n', "")
+    found = read_campaign(campaign(tmp_path, SOURCE.replace("run", "drift_*", 1) + keys + parts + state + STEADY)).runs
+    assert found["run_id"].tolist() == [f"drift_{b}-{p}" for b in ("2.0", "2.5") for p in ("hull", "stern_plane_1")]
+    np.testing.assert_allclose(np.degrees(found["beta"]), [2.0, 2.0, 2.5, 2.5])
+    np.testing.assert_allclose(found["X"], 1000.0 * FORCE.sum(axis=1)[:, 0].mean(), rtol=0.2)
+    twice = parts.replace("stern_plane_1", "hull")
+    with pytest.raises(InputError, match="'hull' twice"):
+        read_campaign(campaign(tmp_path, SOURCE.replace("run", "drift_*", 1) + keys + twice + state + STEADY))
 
 
 def test_totals_that_are_not_their_shares_are_refused(tmp_path):

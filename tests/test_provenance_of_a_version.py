@@ -6,10 +6,13 @@ import html
 import json
 
 import numpy as np
+import pandas as pd
 import pytest
+from click.testing import CliRunner
 from made_campaigns import campaign, history
 
 from ident.campaign import read_campaign
+from ident.cli import main
 from ident.fit import fit
 from ident.provenance import conversions, steps
 from ident.report import write_report
@@ -117,3 +120,38 @@ def test_a_version_from_before_says_so_and_has_the_same_digest(fitted, tmp_path)
     commit(db, done.rows, {})
     assert versions(db)[-1].digest == done.digest
     assert "Not stored with the commit." in write_report(db, None, tmp_path).read_text("utf-8")
+
+
+def said(*arguments: str) -> dict:
+    """What a command writes for a program to read, and nothing else."""
+    done = CliRunner().invoke(main, [*arguments, "--json", "-"])
+    assert done.exit_code == 0, done.output
+    return json.loads(done.stdout)
+
+
+def test_the_report_says_what_it_wrote(fitted, tmp_path):
+    one, db = fitted
+    found = said("report", "--db", db, "--out", str(tmp_path))
+    assert found["file"] == str(tmp_path / "bb2_v0.html")
+    assert (tmp_path / "bb2_v0.html").read_text("utf-8").startswith("<!DOCTYPE html>")
+    assert found["database"] == {"path": db, "version": 0, "digest": one.digest}
+    assert (found["vehicle"], found["rows"]) == ("bb2", len(one.rows))
+    assert found["coefficients"] == one.rows["coefficient"].nunique()
+    assert not set(found["absent"]) & set(one.rows["coefficient"])
+    counts = pd.Series([f.severity for f in one.findings]).value_counts()
+    assert found["findings"] == {k: int(counts.get(k, 0)) for k in ("error", "warning", "info")}
+    assert (found["warnings"], found["unused"]) == (len(one.found.warnings), len(one.found.unused))
+
+
+@pytest.mark.parametrize("kind", ["csv", "parquet", "json"])
+def test_an_export_says_what_it_wrote(fitted, tmp_path, kind):
+    one, db = fitted
+    found = said("export", str(tmp_path / "out"), "--db", db, "--format", kind)
+    read = {"csv": pd.read_csv, "parquet": pd.read_parquet, "json": pd.read_json}[kind]
+    assert len(read(found["file"])) == found["rows"] == len(one.rows)
+    assert (found["format"], found["database"]["digest"]) == (kind, one.digest)
+    assert found["vehicles"] == [{"vehicle": "bb2", "version": 0, "digest": one.digest, "rows": len(one.rows)}]
+    (tmp_path / "what.json").unlink(missing_ok=True)
+    done = CliRunner().invoke(main, ["export", str(tmp_path), "--db", db, "--json", str(tmp_path / "what.json")])
+    assert done.output.strip() == str(tmp_path / "coefficients_v0.csv")
+    assert json.loads((tmp_path / "what.json").read_text())["rows"] == len(one.rows)

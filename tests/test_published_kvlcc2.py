@@ -7,6 +7,7 @@ import math
 import shutil
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 import pytest
 from click.testing import CliRunner
@@ -14,6 +15,7 @@ from click.testing import CliRunner
 from ident.campaign import read_campaign
 from ident.cli import main
 from ident.identify import identify
+from ident.quantities import HARMONICS
 from ident.store import database_rows
 from sim.catalogue import term
 
@@ -62,21 +64,59 @@ def published():
         return {r["parameter"]: float(r["value"]) for r in csv.DictReader(stream)}
 
 
+def _rudder(published):
+    """Factor on the rudder's measured force RY', and where it acts [m]: with what it induces on the hull."""
+    factor = 1.0 + published["a_H"]
+    return factor, (-0.5 + published["a_H"] * published["x_H_dash"]) / factor * LENGTH
+
+
+def _without_rudder(published):
+    """The campaign with the rudder's load taken off, as a laboratory states it."""
+    factor, x = _rudder(published)
+
+    def edit(text):
+        head, *sources = text.split("[[source]]\n")
+        for k, source in enumerate(sources):
+            kinds = [""] if "static" in source else [f"_{h}" for h in HARMONICS]
+            columns = ", ".join(f'"RY{kind}\'" = "Y{kind} [-]"' for kind in kinds)
+            sources[k] = f"""{source}
+[[source.subtract]]
+what = "rudder"
+source = "its own balance; a_H and x_H of the MMG model"
+columns = {{ {columns} }}
+at_m = [{x!r}, 0.0, 0.0]
+factor = {factor!r}
+
+"""
+        return "[[source]]\n".join([head, *sources])
+
+    return edit
+
+
 @pytest.fixture(scope="module")
 def hull(tmp_path_factory, published):
     """The same with the rudder's load taken off: its measured force RY' and what it induces on the hull."""
-    induced, at = published["a_H"], published["x_H_dash"]
-    arm = -0.5 + induced * at - (1.0 + induced) * GRAVITY / LENGTH
+    return _fit(_folder(tmp_path_factory.mktemp("hmri") / "hull", edit=_without_rudder(published)))
 
-    def without_rudder(name, row):
+
+def test_a_load_taken_off_by_the_campaign_is_taken_off_the_sheets(tmp_path, published):
+    """The same subtraction written into the sheets, harmonic by harmonic, in primes and about the balance."""
+    factor, x = _rudder(published)
+
+    def written(name, row):
         row = dict(row)
         for key in [k for k in row if k.startswith("RY")]:
             force, kind = float(row[key]), key[2:]
-            row[f"Y{kind}"] = repr(float(row[f"Y{kind}"]) - (1.0 + induced) * force)
-            row[f"N{kind}"] = repr(float(row[f"N{kind}"]) - arm * force)
+            row[f"Y{kind}"] = repr(float(row[f"Y{kind}"]) - factor * force)
+            row[f"N{kind}"] = repr(float(row[f"N{kind}"]) - factor * (x - GRAVITY) / LENGTH * force)
         return row
 
-    return _fit(_folder(tmp_path_factory.mktemp("hmri") / "hull", rewrite=without_rudder))
+    stated = read_campaign(_folder(tmp_path / "a", edit=_without_rudder(published))).runs
+    sheets = read_campaign(_folder(tmp_path / "b", rewrite=written)).runs
+    for load in ("Y", "N"):
+        np.testing.assert_allclose(stated[load], sheets[load], rtol=1e-9, atol=1e-9)
+    as_measured = read_campaign(_folder(tmp_path / "c")).runs
+    assert np.abs(as_measured["Y"] - stated["Y"]).max() > 1.0
 
 
 def _score(found, name, there):

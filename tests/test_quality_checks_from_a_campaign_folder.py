@@ -81,17 +81,54 @@ def test_stamps_that_are_right_are_passed_over(tmp_path):
     assert not found(record(tmp_path / "b", CLOCK, STEADY + "rate_hz = 2.0\n"), "time")
 
 
-@pytest.mark.parametrize("command", ["check", "fit"])
-def test_stamps_that_do_not_rise_and_nothing_stands_in_for_are_refused(tmp_path, command):
-    record(tmp_path / "c", PRINTED)
-    db = ["--db", str(tmp_path / "db")] if command == "fit" else []
-    done = CliRunner().invoke(main, [command, str(tmp_path / "c"), *db])
+REPEATS = int(np.sum(np.diff(PRINTED) == 0.0))
+BACK = np.concatenate([CLOCK[:200], CLOCK[150:200], CLOCK[200:]])
+
+
+def three_records(folder: Path, *times) -> Path:
+    """A folder a record, so that two files share a name."""
+    for k, time in enumerate(times):
+        record(folder / f"run{k}", time)
+    source = history("run*/tank.csv", "units_row = true\nmatch = '(?P<run_id>run[0-9])/'")
+    return campaign(folder, source)
+
+
+@pytest.mark.parametrize("command", ["fit", "runs", "plan"])
+def test_every_history_whose_stamps_do_not_rise_is_refused_in_one_message(tmp_path, command):
+    three_records(tmp_path / "c", PRINTED, CLOCK, BACK)
+    more = {"fit": ["--db", str(tmp_path / "db")], "runs": ["--out", str(tmp_path / "db")], "plan": []}[command]
+    done = CliRunner().invoke(main, [command, str(tmp_path / "c"), *more])
     said = " ".join(done.output.split())
     assert done.exit_code == 2
-    assert "data row 2, column time" in said
-    assert f"{np.sum(np.diff(PRINTED) == 0.0)} of 400 stamps repeat or step back" in said
+    assert f"{tmp_path}/c/run0/tank.csv, data row 2, column time" in said
+    assert f"{REPEATS} of 400 stamps repeat or step back" in said
+    assert "in 1 more: run2/tank.csv, data row 201: 1075 s after 1099.5 s" in said
+    assert "run1" not in said
     assert "rate_hz" in said
     assert not (tmp_path / "db").exists()
+
+
+def test_a_check_names_every_history_whose_stamps_do_not_rise_and_checks_the_rest(tmp_path):
+    three_records(tmp_path, PRINTED, CLOCK, BACK)
+    done = CliRunner().invoke(main, ["check", str(tmp_path), "--json", "-", "--strict"])
+    assert done.exit_code == 1
+    listed = [f for f in json.loads(done.output)[0]["findings"] if f["check"] == "time"]
+    assert [(f["file"], f["severity"], f["columns"]) for f in listed] == [
+        ("run0/tank.csv", "error", ["time"]),
+        ("run2/tank.csv", "error", ["time"]),
+    ]
+    # Below a comment, the header and the units: sample 2 is in row 5, the step back in row 204.
+    assert (listed[0]["rows"][0], len(listed[0]["rows"])) == (5, REPEATS)
+    assert listed[1]["rows"] == [204]
+    assert "time steps back 1 times, first from 1099.5 s to 1075 s" in listed[1]["what"]
+    assert all("rate_hz" in f["what"] for f in listed)
+
+
+def test_a_check_of_nothing_but_stamps_that_do_not_rise_names_them_too(tmp_path):
+    done = CliRunner().invoke(main, ["check", str(record(tmp_path, PRINTED))])
+    assert done.exit_code == 0, done.output
+    assert "0 runs" in done.output
+    assert "1 error" in done.output
 
 
 @given(

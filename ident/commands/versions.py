@@ -14,18 +14,21 @@ from ident.commands.shared import DB, OUT, VERSION, console_for, emit
 @VERSION
 @click.option("--vehicle", default="bb2", show_default=True, help="Bundled vehicle name, or path to a vehicle file.")
 @OUT
-def report(db: str, version: int | None, vehicle: str, out: Path) -> None:
+@click.option("--json", "json_path", default=None, metavar="PATH|-", help="Write what the page shows as JSON.")
+def report(db: str, version: int | None, vehicle: str, out: Path, json_path: str | None) -> None:
     """Write one self-contained HTML page on a database version.
 
     \b
     Example: ident report --version 0
     """
-    from ident.report import write_report
+    from ident.report import make_report
 
-    console = console_for()
+    console = console_for(quiet=json_path == "-")
     with console.status("drawing every coefficient"):
-        path = write_report(db, version, out, vehicle)
-    console.print(f"report: {path}", highlight=False)
+        done = make_report(db, version, out, vehicle)
+    console.print(f"report: {done['file']}", highlight=False)
+    if json_path:
+        emit(done, json_path)
 
 
 @click.command()
@@ -97,7 +100,8 @@ def diff(first: int, second: int, db: str, json_path: str | None) -> None:
 @click.option("--format", "kind", type=click.Choice(["parquet", "csv", "json"]), default="csv", show_default=True)
 @DB
 @VERSION
-def export(folder: Path, kind: str, db: str, version: int | None) -> None:
+@click.option("--json", "json_path", default=None, metavar="PATH|-", help="Write what was exported as JSON.")
+def export(folder: Path, kind: str, db: str, version: int | None, json_path: str | None) -> None:
     """Write one version as a plain file into FOLDER.
 
     \b
@@ -105,4 +109,8 @@ def export(folder: Path, kind: str, db: str, version: int | None) -> None:
     """
     from ident.compare import export as run
 
-    click.echo(str(run(db, version, kind, folder)))
+    done = run(db, version, kind, folder)
+    if json_path != "-":
+        click.echo(done["file"])
+    if json_path:
+        emit(done, json_path)

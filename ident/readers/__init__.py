@@ -7,13 +7,17 @@ import os
 import re
 from pathlib import Path
 
+from ident.readers.parquet import open_parquet
 from ident.readers.source import Source
-from ident.readers.table import OPENERS, Sheet
-from ident.readers.text import head
+from ident.readers.table import Sheet, open_columns, open_csv
+from ident.readers.text import COMMENTS, head
 from sim.errors import InputError
 
 _LOADS = ("forces", "movingForces", "force", "moment")
 _OUTPUTS = {"forces.dat", "movingForces.dat", "force.dat", "moment.dat", "coefficient.dat", "forceCoeffs.dat"}
+
+
+OPENERS = {"table": open_csv, "starccm": open_csv, "columns": open_columns, "parquet": open_parquet}
 
 
 def matching(folder: Path, source: Source) -> list[Path]:
@@ -54,9 +58,11 @@ def reader_of(path: Path, source: Source) -> str:
         raise InputError(str(path), f"cannot be read: {error.strerror}", "a readable file") from error
     if start == b"PAR1" or path.suffix == ".parquet":
         return "parquet"
+    if source.header_pattern and source.delimiter in (",", ";", "\t"):
+        return "table"
     if source.names or source.header_pattern:
         return "columns"
-    first = next(iter(head(path, source.encoding, ("#", "%", "!")).text), "")
+    first = next(iter(head(path, source.encoding, COMMENTS, source.skip).text), "")
     if source.patterns or re.search(r"\bMonitor\b", first):
         return "starccm"
     if first and not re.search(r"[A-Za-z]", re.sub(r"[eEdD][+-]?\d", "", first)):
@@ -75,8 +81,8 @@ def open_sheet(path: Path, source: Source) -> Sheet:
     """
     reader = reader_of(path, source)
     if reader == "openfoam" or path.is_dir():
-        found = "an OpenFOAM run" if reader == "openfoam" else "a folder"
-        raise InputError(str(path), found, "rows = 'history' and reader = 'openfoam', or a file")
+        text = "a file; rows = 'history' for an OpenFOAM case; a glob such as 'runs.parquet/*.parquet' for many files"
+        raise InputError(str(path), "a folder", text)
     return OPENERS[reader](path, source.model_copy(update={"reader": reader}))
 
 

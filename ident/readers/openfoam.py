@@ -35,6 +35,8 @@ _VECTOR = r"\(\s*[-+\d.eE]+\s+[-+\d.eE]+\s+[-+\d.eE]+\s*\)"
 _COFR = re.compile(rf"^#\s*CofR\s*:\s*({_VECTOR})\s*$")
 _GROUP = re.compile(r"(forces|moments?|localForces|localMoments)\(([^()]*)\)")
 _SPLIT = re.compile(r"\((\w+)_x \1_y \1_z\)|(?<!\()\b(\w+)_x \2_y \2_z\b(?!\))")
+# A number as OpenFOAM writes it: so many digits, two of the exponent.
+_WRITTEN = re.compile(r"-?\d\.(\d+)e[+-]\d\d")
 _SHARES = ("total", "pressure", "viscous", "porous")
 _BRACKETS = str.maketrans("()", "  ")
 _PLAIN = Dialect(" ")
@@ -74,12 +76,14 @@ def read_layout(path: Path) -> Layout:
     first = head(path)
     comments = [(r, t.strip()) for r, t in zip(first.rows, first.text, strict=True) if t.lstrip().startswith("#")]
     columns = next(((r, t) for r, t in comments if re.match(r"#\s*Time\b", t)), None)
-    title = comments[0][1].lstrip("# ").strip() if comments else ""
+    titles = [t.lstrip("# ").strip() for _, t in comments]
+    # A line of one's own may stand above the title.
+    title = next((t for t in titles if t in ("Force", "Moment")), titles[0] if titles else "")
     if columns is None:
         raise InputError(f"{path}, row 1", "no line '# Time ...'", KNOWN)
     row, text = columns
     where = f"{path}, row {row} (header)"
-    if "oefficient" in title or re.search(r"\bC[dlm]\b", text):
+    if any("oefficient" in t for t in titles) or re.search(r"\bC[dlm]\b", text):
         allowed = "forces: coefficients are divided by areas and lengths this campaign does not know"
         raise InputError(where, "force coefficients (forceCoeffs)", allowed)
     rest = re.sub(r"^#\s*Time\s*", "", text)
@@ -153,6 +157,10 @@ def _rows(path: Path, layout: Layout) -> Iterator[tuple[int, Array]]:
     """First row and values of each block of a file, the count of numbers checked."""
     wanted = list(range(len(layout.names)))
     for block in blocks(path, comments=("#",)):
+        if not block.ended and _cut(block.text[-1], len(wanted)):
+            block = Lines(block.rows[:-1], block.text[:-1])
+            if not block.rows:
+                return
         text = []
         for row, line in zip(block.rows, block.text, strict=True):
             if line.count("(") != line.count(")"):
@@ -161,8 +169,20 @@ def _rows(path: Path, layout: Layout) -> Iterator[tuple[int, Array]]:
         yield block.rows[0], numbers(path, Lines(block.rows, text), _PLAIN, wanted, layout.names)
 
 
+def _cut(line: str, count: int) -> bool:
+    """Whether the last line of a file, without its line end, may be cut short by a run that was killed.
+
+    A bracket ends the last number; where there is none, it has to have as many digits as the one before.
+    """
+    cells = line.translate(_BRACKETS).split()
+    if len(cells) != count or line.count("(") != line.count(")"):
+        return True
+    last, before = (_WRITTEN.fullmatch(cell) for cell in (cells[-1], cells[-2]))
+    return not line.rstrip().endswith(")") and not (last and before and len(last[1]) == len(before[1]))
+
+
 def _steps_back(path: Path, layout: Layout) -> tuple[float, list[tuple[int, float]]]:
-    """First time of a file, and (row number, time) wherever time repeats or goes back."""
+    """First time of a file (infinite without rows), and (row number, time) wherever it repeats or goes back."""
     first, last, count = np.inf, -np.inf, 0
     back: list[tuple[int, float]] = []
     for row, values in _rows(path, layout):
@@ -174,8 +194,6 @@ def _steps_back(path: Path, layout: Layout) -> tuple[float, list[tuple[int, floa
             text = "time that moves on, a restart aside; write it with more digits (timePrecision)"
             raise InputError(f"{path}, row {row} or after", f"{len(back)} repeated times", text)
         last, count = float(values[-1, 0]), count + len(values)
-    if not count:
-        raise InputError(str(path), "no rows below the header", "at least one time step")
     return first, back
 
 
@@ -213,9 +231,17 @@ def merged(paths: list[Path]) -> Iterator[tuple[Layout, Path, int, Array]]:
     Yields
     ------
     Layout, file, first file row, values (rows, numbers) with the overtaken rows taken out.
+
+    Raises
+    ------
+    InputError
+        When no file has a row; a restart that ended before its first one is passed over.
     """
+    paths = [p for p in paths if p.stat().st_size] or paths
     layouts = [read_layout(p) for p in paths]
     scans = [_steps_back(p, layout) for p, layout in zip(paths, layouts, strict=True)]
+    if all(first == np.inf for first, _ in scans):
+        raise InputError(str(paths[-1]), "no rows below the header", "at least one time step")
     for i, (path, layout) in enumerate(zip(paths, layouts, strict=True)):
         limit = min((first for first, _ in scans[i + 1 :]), default=np.inf)
         back = scans[i][1]
@@ -310,6 +336,9 @@ def _paired(forces: list[Path], moments: list[Path]) -> Iterator[tuple[Array, Ar
         if a is None or b is None:
             longer = a or b
             assert longer is not None
+            # A run that is being written, or was killed, has one of the two files a row behind.
+            if len(longer[1]) == 1 and next(left if a else right, None) is None:
+                return
             place = f"{longer[0]}, time {longer[1][0, 0]:g}"
             raise InputError(place, "no row in the other file", "force.dat and moment.dat with the same times")
         n = min(len(a[1]), len(b[1]))

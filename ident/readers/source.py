@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, field_validator, model_validator
 
+from ident.readers.text import Encoding
 from sim.schema import Data
 
 READERS = ("table", "parquet", "starccm", "columns", "openfoam")
@@ -19,6 +20,7 @@ MOTIONS = {
     "pitch": ("q", "qdot"),
     "yaw": ("r", "rdot"),
 }
+NO_COLUMNS = "no subtract: a function object of the patches that are wanted, OpenFOAM's files have no other columns"
 Vector = Annotated[list[float], Field(min_length=3, max_length=3)]
 Positive = Annotated[float, Field(gt=0, le=1e9)]
 Span = Annotated[list[float], Field(min_length=2, max_length=2)]
@@ -59,6 +61,28 @@ class Reduction(Data):
         return self
 
 
+class Subtract(Data):
+    """Measured loads of a part, taken off the total: a rudder on its own balance, a thrust column.
+
+    Attributes
+    ----------
+    what : The part.
+    source : Where this is said.
+    columns : Header -> load of the part, along the campaign's axes, perhaps with unit: ``RY = "Y [N]"``.
+    at_m : Where its forces act and its moments are about, from the vehicle's origin, in the
+        campaign's axes and scale: the moment of the forces is taken off too. Without it the moments
+        in ``columns`` are about the campaign's moment point, and have to be complete.
+    factor : On all of its loads: -1 for a column of the other sign, 1 + a_H for a rudder that also
+        loads the hull.
+    """
+
+    what: Annotated[str, Field(min_length=1, max_length=200)]
+    source: Annotated[str, Field(min_length=1, max_length=500)]
+    columns: Annotated[dict[str, str], Field(min_length=1)]
+    at_m: Vector | None = None
+    factor: Annotated[float, Field(ge=-100, le=100)] = 1.0
+
+
 class Source(Data):
     """Some files of a campaign that share a format; every key is in ``docs/readers.md``.
 
@@ -74,11 +98,13 @@ class Source(Data):
     ignore: list[str] = Field(default_factory=list)
     names: list[str] = Field(default_factory=list)
     header_pattern: str = ""
+    widths: Annotated[list[Annotated[int, Field(ge=1, le=1000)]], Field(max_length=1000)] = Field(default_factory=list)
     units_row: bool = False
     delimiter: Literal["", ",", ";", "\t", " "] = ""
     decimal: Literal["", ".", ","] = ""
     thousands: Literal["", ".", ",", "'", " "] = ""
-    encoding: Literal["utf-8", "latin-1"] = "utf-8"
+    encoding: Encoding = "utf-8"
+    skip: str = ""
     constants: dict[str, str | float] = Field(default_factory=dict)
     within: dict[str, Span] = Field(default_factory=dict)
     match: str = ""
@@ -87,8 +113,9 @@ class Source(Data):
     rho_inf: Positive | None = None
     vehicle_origin: Vector | None = None
     reduction: Reduction | None = None
+    subtract: list[Subtract] = Field(default_factory=list)
 
-    @field_validator("match", "header_pattern")
+    @field_validator("match", "header_pattern", "skip")
     @classmethod
     def _pattern_compiles(cls, text: str) -> str:
         _compiled(text)
@@ -117,6 +144,8 @@ class Source(Data):
             raise ValueError("rows = 'history': only time histories are reduced")
         if self.reader == "openfoam" and self.rows != "history":
             raise ValueError("rows = 'history': OpenFOAM writes time histories")
+        if self.reader == "openfoam" and self.subtract:
+            raise ValueError(NO_COLUMNS)
         if self.files.startswith(("/", "~")) or ".." in self.files.replace("\\", "/").split("/"):
             raise ValueError("a path below the campaign folder")
         return self

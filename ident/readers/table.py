@@ -7,11 +7,11 @@ file of any size is read in bounded memory.
 from __future__ import annotations
 
 import fnmatch
+import itertools
 import re
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -19,13 +19,15 @@ from numpy.typing import NDArray
 
 from ident.quantities import Column, column, split
 from ident.readers.source import Source
-from ident.readers.text import LARGEST, Dialect, Lines, blocks, head, numbers, sniff
+from ident.readers.text import COMMENTS, Dialect, Lines, blocks, decimal_mark, head, numbers, sniff
 from sim.errors import InputError
 
 Array = NDArray[np.float64]
 # A table of runs has a row a run; what is longer is a time history.
 _MOST_RUNS = 100_000
-_BATCH = 1 << 14
+# Rows at the end of a history that may lack cells: what a run that is still being written leaves.
+_MOST_UNFINISHED = 10
+_NO_DATA = "; skip = '...' in [[source]] leaves out lines that are no data"
 
 
 @dataclass(frozen=True)
@@ -41,6 +43,7 @@ class Sheet:
     cells : Blocks of (file row, cells as text), for a table of runs.
     dialect : How its numbers are written.
     first_row : Row where the data begin.
+    spacers : Columns without a name that are empty.
     """
 
     path: Path
@@ -50,6 +53,7 @@ class Sheet:
     cells: Callable[[], Iterator[tuple[int, list[str]]]]
     dialect: Dialect
     first_row: int = 2
+    spacers: tuple[str, ...] = ()
 
     @property
     def where(self) -> str:
@@ -57,26 +61,90 @@ class Sheet:
         return f"{self.path}, row {self.header_row} (header)"
 
 
-def _once(where: str, header: list[str]) -> None:
+def ignored(header: str, source: Source) -> bool:
+    """Whether the campaign leaves a column out."""
+    return any(fnmatch.fnmatchcase(h, p) for h in (header, split(header)[0]) for p in source.ignore)
+
+
+def once(where: str, header: list[str], source: Source) -> None:
+    """Refuse a column that stands twice and is not left out."""
     for name in header:
-        if header.count(name) > 1:
-            raise InputError(where, f"column {name[:60]!r} stands twice", "each column once")
+        if header.count(name) > 1 and not ignored(name, source):
+            raise InputError(where, f"column {name[:60]!r} stands twice", "each column once, or in ignore")
+
+
+def _blocks(path: Path, source: Source, comments: tuple[str, ...] = COMMENTS) -> Iterator[Lines]:
+    """Lines as the campaign says they are to be read: without what it skips, fixed widths set apart."""
+    edges = np.cumsum([0, *source.widths]).tolist()
+    for block in blocks(path, source.encoding, comments, source.skip):
+        if not source.widths:
+            yield block
+            continue
+        pieces = [[line[a:b] for a, b in itertools.pairwise(edges)] for line in block.text]
+        yield Lines(block.rows, [" ".join(cells) for cells in pieces], block.ended)
+
+
+def _whole_rows(
+    path: Path, data: Iterator[Lines], dialect: Dialect, wanted: list[int], header: list[str], solver: bool
+) -> Iterator[Array]:
+    """Numbers of every row; rows at the end that a run still being written leaves unfinished are left out.
+
+    Parameters
+    ----------
+    solver : A row without line end is never whole: its last number may be cut.
+
+    Raises
+    ------
+    InputError
+        For a cell that is no number, an unfinished row with others below it, or too many of them.
+    """
+    pending: InputError | None = None
+    left = 0
+    for block in data:
+        text, cut = block.text, 0
+        while cut < len(text) and _unfinished(text[-1 - cut], dialect, wanted, cut == 0 and not block.ended, solver):
+            cut += 1
+        if pending and cut < len(text):
+            raise pending
+        left += cut
+        whole = Lines(block.rows[: len(text) - cut], text[: len(text) - cut])
+        if whole.text:
+            yield numbers(path, whole, dialect, wanted, header, _NO_DATA)
+        if cut:
+            try:
+                numbers(path, Lines(block.rows[-cut:], text[-cut:]), dialect, wanted, header, _NO_DATA)
+            except InputError as error:
+                pending = pending or error
+        if pending and left > _MOST_UNFINISHED:
+            raise pending
+
+
+def _unfinished(line: str, dialect: Dialect, wanted: list[int], open_end: bool, solver: bool) -> bool:
+    """Whether a row lacks a wanted cell: blank, or cut off with the file."""
+    if open_end and solver:
+        return True
+    try:
+        cells = dialect.cells(line, "")
+    except InputError:
+        return open_end
+    if open_end and (len(cells) <= max(wanted) or dialect.number(cells[max(wanted)]) is None):
+        return True
+    return dialect.delimiter != " " and any(i >= len(cells) or not cells[i] for i in wanted)
 
 
 def _text_sheet(path: Path, source: Source, dialect: Dialect, header: list[str], first: Lines, skip: int) -> Sheet:
     """A sheet over the lines after the header; ``skip`` is the last row that is not data."""
 
     def data() -> Iterator[Lines]:
-        for block in blocks(path, source.encoding):
+        for block in _blocks(path, source):
             if block.rows[0] > skip:
                 yield block
             elif block.rows[-1] > skip:
                 i = next(k for k, row in enumerate(block.rows) if row > skip)
-                yield Lines(block.rows[i:], block.text[i:])
+                yield Lines(block.rows[i:], block.text[i:], block.ended)
 
     def values(wanted: list[int]) -> Iterator[Array]:
-        for block in data():
-            yield numbers(path, block, dialect, wanted, header)
+        yield from _whole_rows(path, data(), dialect, wanted, header, source.reader == "starccm")
 
     def cells() -> Iterator[tuple[int, list[str]]]:
         for block in data():
@@ -90,7 +158,7 @@ def _text_sheet(path: Path, source: Source, dialect: Dialect, header: list[str],
                 # Spreadsheets drop blank cells at the end of a row.
                 yield row, found + [""] * (len(header) - len(found))
 
-    _once(f"{path}, row {first.rows[0]} (header)", header)
+    once(f"{path}, row {first.rows[0]} (header)", header, source)
     return Sheet(path, first.rows[0], header, values, cells, dialect, skip + 1)
 
 
@@ -102,13 +170,20 @@ def open_csv(path: Path, source: Source) -> Sheet:
     InputError
         For a file without header, an unclosed quote, an ambiguous number, a column twice.
     """
-    first = head(path, source.encoding, ("#", "%", "!"))
-    dialect = sniff(path, first, source.delimiter, source.decimal, source.thousands)
-    header = dialect.cells(first.text[0], f"{path}, row {first.rows[0]}")
+    first, delimiter = _below_title(path, source)
+    dialect = sniff(path, first, delimiter, source.decimal, source.thousands)
+    where = f"{path}, row {first.rows[0]} (header)"
+    header = dialect.cells(first.text[0], where)
     while header and not header[-1]:
         header.pop()
-    if not header or "" in header:
-        raise InputError(f"{path}, row {first.rows[0]} (header)", "a column without a name", "a name for every column")
+    if not header:
+        raise InputError(where, "a column without a name", "a name for every column")
+    rows = [dialect.cells(line, f"{path}, row {row}") for row, line in zip(first.rows[1:], first.text[1:], strict=True)]
+    longest = max((i + 1 for cells in rows[:1] for i, cell in enumerate(cells) if cell), default=0)
+    if longest > len(header):
+        text = "a name for every column; header_pattern and delimiter where a title stands above the header"
+        raise InputError(where, f"{len(header)} names above {longest} cells", text)
+    header, spacers = _nameless(header, rows, source, where)
     skip = first.rows[0]
     if source.units_row:
         if len(first.text) < 2:
@@ -118,7 +193,42 @@ def open_csv(path: Path, source: Source) -> Sheet:
         if len(given) != len(header):
             raise InputError(f"{path}, row {skip}", f"{len(given)} units", f"{len(header)}, one a column")
         header = [f"{name} [{unit.strip('[]()')}]" if unit else name for name, unit in zip(header, given, strict=True)]
-    return _text_sheet(path, source, dialect, header, first, skip)
+    sheet = _text_sheet(path, source, dialect, header, first, skip)
+    return replace(sheet, spacers=spacers)
+
+
+def _nameless(
+    header: list[str], rows: list[list[str]], source: Source, where: str
+) -> tuple[list[str], tuple[str, ...]]:
+    """A header with ``column 3`` where no name stands, and those names; refused where cells stand below one."""
+    names = [name or f"column {i + 1}" for i, name in enumerate(header)]
+    spacers = tuple(named for named, name in zip(names, header, strict=True) if not name)
+    for i, name in enumerate(names):
+        if name in spacers and not ignored(name, source) and any(len(cells) > i and cells[i] for cells in rows):
+            text = f'a name for every column, or ignore = ["{name}"] in [[source]]'
+            raise InputError(where, f"a column without a name ({name})", text)
+    return names, spacers
+
+
+def _below_title(path: Path, source: Source) -> tuple[Lines, str]:
+    """The first lines from the header on, and the delimiter where the campaign or the file states it."""
+    first = head(path, source.encoding, COMMENTS, source.skip)
+    at = 0
+    if source.header_pattern:
+        at = _pattern_row(path, first, source)
+    elif first.text and (stated := re.fullmatch(r'"?sep=([,;\t])"?', first.text[0].strip(" "))):
+        # The line by which spreadsheets are told.
+        return Lines(first.rows[1:], first.text[1:]), source.delimiter or stated[1]
+    return Lines(first.rows[at:], first.text[at:]), source.delimiter
+
+
+def _pattern_row(path: Path, first: Lines, source: Source) -> int:
+    """Which of the first lines fits ``header_pattern``."""
+    pattern = re.compile(source.header_pattern)
+    at = next((i for i, line in enumerate(first.text) if pattern.search(line)), -1)
+    if at < 0:
+        raise InputError(str(path), "no line in the first 200 fits header_pattern", repr(source.header_pattern))
+    return at
 
 
 def open_columns(path: Path, source: Source) -> Sheet:
@@ -132,26 +242,41 @@ def open_columns(path: Path, source: Source) -> Sheet:
     InputError
         When neither is declared, no line fits, or no line of numbers follows.
     """
-    first = head(path, source.encoding)
-    dialect = Dialect(source.delimiter or " ", source.decimal or ".", source.thousands)
+    first = head(path, source.encoding, skip=source.skip)
     if source.names:
         header, at = source.names, -1
     elif source.header_pattern:
-        pattern = re.compile(source.header_pattern)
-        at = next((i for i, line in enumerate(first.text) if pattern.search(line)), -1)
-        if at < 0:
-            raise InputError(str(path), "no line in the first 200 fits header_pattern", repr(source.header_pattern))
+        at = _pattern_row(path, first, source)
         header = header_names(first.text[at])
     else:
         text = "names = [...] or header_pattern = '...' in [[source]], see docs/readers.md"
         raise InputError(str(path), "columns without declared names", text)
-    for row, line in list(zip(first.rows, first.text, strict=True))[at + 1 :]:
+    below = next(_blocks(path, source, ("\0",)), Lines([], []))
+    below = Lines(below.rows[at + 1 : len(first.rows)], below.text[at + 1 : len(first.rows)])
+    dialect = Dialect(
+        source.delimiter or " ",
+        source.decimal or _columns_decimal(path, below, header, source),
+        source.thousands,
+    )
+    for row, line in zip(below.rows, below.text, strict=True):
         cells = dialect.cells(line, f"{path}, row {row}") if dialect.delimiter == " " else line.split(dialect.delimiter)
         if len(cells) == len(header) and all(dialect.number(c) is not None for c in cells):
             lines = Lines([first.rows[max(at, 0)]], [first.text[max(at, 0)]])
             return _text_sheet(path, source, dialect, header, lines, row - 1)
     found = f"no line with {len(header)} numbers in the first {len(first.text)}"
-    raise InputError(str(path), found, f"numbers for {', '.join(header)[:200]}")
+    text = f"numbers for {', '.join(header)[:200]}; decimal, delimiter or widths = [...] where blanks do not part them"
+    raise InputError(str(path), found, text)
+
+
+def _columns_decimal(path: Path, below: Lines, header: list[str], source: Source) -> str:
+    """The decimal mark of white-space columns, from the lines that have a number in each."""
+    mark = source.delimiter.strip(" ") or None
+    rows = [(row, [c.strip() for c in line.split(mark)]) for row, line in zip(below.rows, below.text, strict=True)]
+    form = re.compile(r"[+-]?[\d.,]*\d[.,]?\d*([eEdD][+-]?\d{1,3})?", re.ASCII)
+    full = [
+        (row, c) for row, cells in rows if len(cells) == len(header) for c in cells if all(map(form.fullmatch, cells))
+    ]
+    return decimal_mark(path, [(row, c) for row, c in full if "," in c or "." in c], None, source.thousands)
 
 
 def header_names(line: str) -> list[str]:
@@ -163,63 +288,19 @@ def header_names(line: str) -> list[str]:
     return re.findall(r"[^\s\[(]+(?:\s?[\[(][^\])]*[\])])?", text)
 
 
-def open_parquet(path: Path, source: Source) -> Sheet:
-    """A Parquet table; headers carry units as in a CSV file.
+def position(sheet: Sheet, name: str) -> int:
+    """Where a column of ``[[source.subtract]]`` stands, by its whole header or the header without its unit.
 
     Raises
     ------
     InputError
-        For a file that is not Parquet or is cut short.
+        When there is none.
     """
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
-    bad = (pa.ArrowException, OSError, ValueError, MemoryError, OverflowError)
-
-    def refused(error: Exception) -> InputError:
-        return InputError(str(path), f"not a Parquet table: {str(error)[:120]}", "a whole Parquet file")
-
-    try:
-        with pq.ParquetFile(path) as opened:
-            header = [str(n) for n in opened.schema_arrow.names]
-    except bad as error:
-        raise refused(error) from error
-    _once(f"{path} (schema)", header)
-
-    def batches(names: list[str]) -> Iterator[tuple[int, Any]]:
-        row = 1
-        try:
-            with pq.ParquetFile(path) as opened:
-                for batch in opened.iter_batches(batch_size=_BATCH, columns=names):
-                    yield row, batch
-                    row += batch.num_rows
-        except bad as error:
-            raise refused(error) from error
-
-    def values(wanted: list[int]) -> Iterator[Array]:
-        names = [header[i] for i in wanted]
-        for row, batch in batches(names):
-            columns = []
-            for name in names:
-                array = pd.to_numeric(batch.column(name).to_pandas(), errors="coerce").to_numpy(dtype=float)
-                fail = np.flatnonzero(~(np.abs(array) <= LARGEST))
-                if fail.size:
-                    place = f"{path}, row {row + int(fail[0])}, column {name[:60]}"
-                    shown = repr(batch.column(name)[int(fail[0])].as_py())[:60]
-                    raise InputError(place, shown, f"a finite number of at most {LARGEST:g}")
-                columns.append(array)
-            yield np.stack(columns, axis=1)
-
-    def cells() -> Iterator[tuple[int, list[str]]]:
-        for row, batch in batches(header):
-            columns = [batch.column(name).to_pylist() for name in header]
-            for i, found in enumerate(zip(*columns, strict=True)):
-                yield row + i, ["" if c is None else c if isinstance(c, str) else repr(c) for c in found]
-
-    return Sheet(path, 0, header, values, cells, Dialect())
-
-
-OPENERS = {"table": open_csv, "starccm": open_csv, "columns": open_columns, "parquet": open_parquet}
+    for names in (sheet.header, [split(h)[0] for h in sheet.header]):
+        if name in names:
+            return names.index(name)
+    shown = ", ".join(sheet.header)[:200]
+    raise InputError(sheet.where, f"no column {name[:60]!r}, which [[source.subtract]] names", shown)
 
 
 def columns_of(sheet: Sheet, source: Source, text: tuple[str, ...]) -> list[Column | None]:
@@ -228,7 +309,7 @@ def columns_of(sheet: Sheet, source: Source, text: tuple[str, ...]) -> list[Colu
     Parameters
     ----------
     sheet : The open table.
-    source : Its ``columns``, ``patterns`` and ``ignore``.
+    source : Its ``columns``, ``patterns`` and ``ignore``; columns of ``subtract`` are passed over.
     text : Names of the text columns of a run table.
 
     Raises
@@ -238,14 +319,19 @@ def columns_of(sheet: Sheet, source: Source, text: tuple[str, ...]) -> list[Colu
         columns of one quantity.
     """
     by_pattern = _by_pattern(sheet, source)
+    parts = {position(sheet, name) for one in source.subtract for name in one.columns}
     found: list[Column | None] = []
-    for header in sheet.header:
+    for i, header in enumerate(sheet.header):
         name = split(header)[0]
         declared = by_pattern.get(header) or source.columns.get(header) or source.columns.get(name)
-        if (
-            declared is None
-            and (source.patterns or any(fnmatch.fnmatchcase(h, p) for h in (header, name) for p in source.ignore))
-        ) or (declared or header) in text:
+        if header in sheet.spacers:
+            found.append(None)
+        elif i in parts:
+            if declared is not None:
+                found_twice = f"column {header[:60]!r} in [[source.subtract]] and in [source.columns] or patterns"
+                raise InputError(sheet.where, found_twice, "one of the two")
+            found.append(None)
+        elif (declared is None and (source.patterns or ignored(header, source))) or (declared or header) in text:
             found.append(None)
         else:
             found.append(column(header, declared, sheet.where))
