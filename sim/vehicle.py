@@ -201,7 +201,7 @@ def read_toml(name: str | Path, kind: str, named_in: str = "") -> tuple[dict[str
     Parameters
     ----------
     name : The name or path.
-    kind : ``vehicles`` or ``cases``.
+    kind : ``vehicles`` or ``cases``; empty where none are bundled.
     named_in : File and key that name it, for the message.
 
     Raises
@@ -210,20 +210,22 @@ def read_toml(name: str | Path, kind: str, named_in: str = "") -> tuple[dict[str
         When neither a bundled file nor a readable TOML file of that name exists.
     """
     path = Path(name)
-    if path.suffix != ".toml" and str(name) in bundled(kind):
+    if kind and path.suffix != ".toml" and str(name) in bundled(kind):
         return tomllib.loads((files("sim") / kind / f"{name}.toml").read_text("utf-8")), str(name)
     try:
         there = path.is_file()
     except OSError:
         there = False
     if not there:
-        found, text = "no such file or bundled name", f"one of {', '.join(bundled(kind))}, or a path"
+        found, text = "no such file", "a path to a .toml file"
+        if kind:
+            found, text = "no such file or bundled name", f"one of {', '.join(bundled(kind))}, or a path"
         if named_in:
             raise InputError(named_in, f"{str(name)[:200]!r}: {found}", text)
         raise InputError(str(name)[:200], found, text)
     try:
         return tomllib.loads(path.read_text("utf-8")), str(path)
-    except (ValueError, RecursionError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         raise InputError(str(path), f"not TOML: {error}", "a TOML file in UTF-8") from error
 
 

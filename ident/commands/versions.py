@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from ident.commands.shared import DB, OUT, VERSION, console_for, emit
+from ident.commands.shared import DB, FOLDER, OUT, VERSION, console_for, emit, json_to
 
 
 @click.command()
@@ -30,7 +30,7 @@ def report(db: str, version: int | None, vehicle: str, out: Path) -> None:
 
 @click.command()
 @DB
-@click.option("--json", "json_path", default=None, metavar="PATH|-", help="Write the list as JSON.")
+@json_to("Write the list as JSON.")
 def versions(db: str, json_path: str | None) -> None:
     """List the versions of a database.
 
@@ -65,7 +65,7 @@ def versions(db: str, json_path: str | None) -> None:
 @click.argument("first", type=int)
 @click.argument("second", type=int)
 @DB
-@click.option("--json", "json_path", default=None, metavar="PATH|-", help="Write the differences as JSON.")
+@json_to("Write the differences as JSON.")
 def diff(first: int, second: int, db: str, json_path: str | None) -> None:
     """Show what changed between two versions.
 
@@ -93,7 +93,7 @@ def diff(first: int, second: int, db: str, json_path: str | None) -> None:
 
 
 @click.command()
-@click.argument("folder", type=click.Path(path_type=Path))
+@FOLDER
 @click.option("--format", "kind", type=click.Choice(["parquet", "csv", "json"]), default="csv", show_default=True)
 @DB
 @VERSION
