@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 
 from ident.exceedance import Side, exceedances, rice_rate
 from ident.figures import DOWNWARDS, dress, finish, pyplot, readable
-from ident.seakeeping import Harmonics
-from ident.seakeeping_published import as_published
+from ident.seakeeping import Harmonics, as_published
 from ident.seaway import Statistics, spectrum, uniform_step
 from sim.simulate import Simulation
 
@@ -209,7 +208,8 @@ def harmonics_figure(
     Parameters
     ----------
     flown : Depth of the sail top D0 [m] -> harmonics.
-    reference : From ``seakeeping_published.read_published``; may be empty.
+    reference : Published values: source, channel (``dz1_over_aw`` [-], ``theta1`` [deg]), D0_m,
+        value, and sigma, the standard error of reading it; may be empty.
     path, title, stamp : As in ``seaway_figure``.
 
     Returns
