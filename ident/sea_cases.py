@@ -63,6 +63,7 @@ def regular_waves(found: Mapping[str, Harmonics]) -> Metrics:
         "theta1_deg": own["theta1"][0],
         "dz1_over_aw_stderr": own["dz1_over_aw"][1],
         "theta1_stderr_deg": own["theta1"][1],
+        "speed_mean_mps": found["D0"].encounter.speed,
         "D0_mean_m": found["D0"].mean,
         "theta_mean_deg": math.degrees(found["theta"].mean),
         "frequency_of_encounter_radps": found["D0"].encounter.frequency,

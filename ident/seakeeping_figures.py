@@ -229,6 +229,7 @@ def harmonics_figure(
             style = {"label": str(source), "color": "tab:gray", "marker": "v", "ls": ""} | _STYLES.get(str(source), {})
             axis.errorbar(rows["D0_m"], rows["value"], yerr=2.0 * rows["sigma"], ms=6, capsize=3, **style)
         dress(axis, "depth of the sail top D0 [m]", _LABEL_OF[channel])
+        axis.margins(0.08)
         axis.set_ylim(bottom=0.0)
         axis.set_xlim(left=0.0)
     figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=4, frameon=False)

@@ -264,7 +264,7 @@ def validate(
     simulation, own = flights(case, boat)
     for one in (simulation, *own.values()):
         if len(one["t"]) < 2:
-            found_at = f"the run ends at {one.end[0]:.4g} s, before a second record"
+            found_at = f"the run ends at {one.end[0]:.3f} s, before a second record"
             raise InputError(f"{where}, key run", found_at, "a run of two records or more; events that happen later")
     found = errors(case, reference, simulation, own)
     found_on = measured(case, simulation, reference, own)

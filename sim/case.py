@@ -291,7 +291,7 @@ def _numbers(table: pd.DataFrame, column: str, path: Path) -> None:
     if bad.size:
         place, given = f"{path}, row {bad[0] + 2}, column {column}", table[column].iloc[bad[0]]
         allowed = "a finite number" if column == "value" else "a finite number, zero or more"
-        raise InputError(place, "nothing" if pd.isna(given) else repr(str(given)), allowed)
+        raise InputError(place, "nothing or nan" if pd.isna(given) else repr(str(given)), allowed)
     table[column] = numbers
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 from small_campaign import RUNS, fitted, write
 
+from ident.output import whole
 from ident.store import commit
 from sim.database import read_rows, versions
 from sim.errors import InputError
@@ -62,6 +63,33 @@ def test_damaged_database_is_refused(tmp_path):
         versions(str(path))
 
 
+def test_a_log_cut_short_is_refused_in_one_line(tmp_path):
+    """The storage engine adds its own trace to the message."""
+    path = tmp_path / "db"
+    commit(str(path), fitted(write(tmp_path / "campaign")), {})
+    log = next((path / "_delta_log").glob("*.json"))
+    log.write_text(log.read_text()[:-400])
+    with pytest.raises(InputError, match="not a coefficient database") as caught:
+        versions(str(path))
+    assert "\n" not in caught.value.found
+    assert "0:" not in caught.value.found
+
+
+def test_a_file_that_cannot_be_finished_leaves_the_old_one(tmp_path):
+    path = tmp_path / "report.html"
+    path.write_text("old")
+
+    def disk_runs_full() -> None:
+        with whole(path) as part:
+            part.write_text("half")
+            raise OSError(28, "no room")
+
+    with pytest.raises(InputError, match="no room"):
+        disk_runs_full()
+    assert [p.name for p in tmp_path.iterdir()] == ["report.html"]
+    assert path.read_text() == "old"
+
+
 def test_database_without_its_data_files_is_refused(tmp_path):
     path = tmp_path / "db"
     commit(str(path), fitted(write(tmp_path / "campaign")), {})
@@ -106,17 +134,31 @@ def test_command_line_shows_a_mistake_without_a_traceback(tmp_path):
         ("validate", "--case", "no-such-case", "--db", "{here}/good"),
         ("report", "--db", "{here}/absent", "--out", "{here}/out"),
         ("report", "--db", "{here}/good", "--out", "{here}/file"),
+        ("fit", "{here}/campaign", "--db", "{here}/new", "--json", "{here}"),
+        ("fit", "{here}/campaign", "--db", "{here}/new", "--json", "{here}/file/below.json"),
+        ("runs", "{here}/campaign", "--out", "{here}/file/below"),
+        ("plan", "{here}/campaign", "--out", "{here}"),
+        ("plan", "{here}/campaign", "--facility", "{here}/none.toml"),
+        ("calibrate", "bb2", "--db", "{here}/good", "--json", "{here}"),
+        ("calibrate", "bb2", "--db", "{here}/good", "--version", "7"),
+        ("animate", "--case", "hzz20", "--db", "{here}/good", "--out", "{here}"),
+        ("stability", "--db", "{here}/good", "--depth", "-5"),
+        ("stability", "--db", "{here}/good", "--speed", "nan"),
+        ("validate", "--case", "hzz20", "--db", "{here}/good", "--cases", "{here}"),
+        ("validate", "--case", "hzz20", "--db", "{here}/good", "--json", "{here}"),
     ],
 )
 def test_every_command_ends_with_code_2_and_one_message(tmp_path, arguments):
     folder = write(tmp_path / "campaign")
     (tmp_path / "file").write_text("in the way")
     commit(str(tmp_path / "good"), fitted(folder), {})
+    before = sorted(tmp_path.rglob("*"))
     result = command(*[a.format(here=tmp_path) for a in arguments])
     assert result.exit_code == 2, (result.output, result.exception)
     assert "Traceback" not in result.output
     assert "Error" in result.output
     assert (tmp_path / "file").read_text() == "in the way"
+    assert sorted(tmp_path.rglob("*")) == before
 
 
 def test_fit_by_command_line_says_the_version(tmp_path):
