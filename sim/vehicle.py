@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import Field, field_validator
+from pydantic import AfterValidator, Field, field_validator
 
 from sim.errors import InputError
 from sim.frames import PROGRAM, Frame
@@ -41,26 +41,46 @@ class Limits(Data):
     source: str
 
 
+def _stated(unit: str, positive: bool = False) -> AfterValidator:
+    """Numbers are taken as they are: what states another unit, or a size that is none, is refused."""
+
+    def check(given: Number | Triple | Limits) -> Number | Triple | Limits:
+        if given.unit != unit:
+            raise ValueError(f"unit {unit!r}, and the value in it")
+        if positive and isinstance(given, Number) and not given.value > 0.0:
+            raise ValueError("a value above zero")
+        if isinstance(given, Limits) and not given.value[0] < given.value[1]:
+            raise ValueError("the lower limit, then the upper one")
+        return given
+
+    return AfterValidator(check)
+
+
+Length = Annotated[Number, _stated("m", positive=True)]
+Mass = Annotated[Number, _stated("kg", positive=True)]
+Place = Annotated[Triple, _stated("m")]
+
+
 class Particulars(Data):
     """Mass, inertia and reference points; positions from the body origin."""
 
-    length: Number
-    mass: Number
-    displaced_mass: Number
-    radius_of_gyration: Triple
-    centre_of_gravity: Triple
-    centre_of_buoyancy: Triple
-    sail_top: Triple
+    length: Length
+    mass: Mass
+    displaced_mass: Mass
+    radius_of_gyration: Place
+    centre_of_gravity: Place
+    centre_of_buoyancy: Place
+    sail_top: Place
 
 
 class Propeller(Data):
     """Propeller diameter, the limits of its revolutions, and where it is (waves need that)."""
 
     name: str
-    diameter: Number
-    limits: Limits
-    rate: Number
-    position: Triple | None = None
+    diameter: Length
+    limits: Annotated[Limits, _stated("rps")]
+    rate: Annotated[Number, _stated("rps/s", positive=True)]
+    position: Place | None = None
 
 
 class Mixer(Data):
@@ -108,16 +128,16 @@ class Sections(Data):
 class BallastTank(Data):
     """Water taken in and pumped out: where, how much, how fast."""
 
-    position: Triple
-    limit: Number
-    rate: Number
+    position: Place
+    limit: Mass
+    rate: Annotated[Number, _stated("kg/s", positive=True)]
 
 
 class TrimTank(Data):
     """Water moved along the boat, as the shift of the centre of gravity: how far, how fast."""
 
-    limit: Number
-    rate: Number
+    limit: Length
+    rate: Annotated[Number, _stated("m/s", positive=True)]
 
 
 class Tanks(Data):

@@ -9,6 +9,7 @@ import pytest
 from ident.validate import validate
 from sim.case import load_case
 from sim.errors import InputError
+from sim.vehicle import load_vehicle
 
 TEXT = (files("sim") / "cases" / "roll-decay.toml").read_text("utf-8")
 SERIES = (files("sim") / "cases" / "data" / "roll_decay.csv").read_text("utf-8")
@@ -109,3 +110,26 @@ def test_a_start_above_the_surface_is_refused_but_for_a_boat_that_may_be_there(t
         load_case(path)
     path.write_text(path.read_text().replace("gravity_mps2 = 9.81", "gravity_mps2 = 9.81\nfree_surface = true"))
     assert load_case(path)[0].initial.depth_m == -3.0
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ('value = 70.2, unit = "m"', 'value = 70.2, unit = "ft"', ["particulars.length", "'ft'", "unit 'm'"]),
+        ("length = { value = 70.2", "length = { value = -70.2", ["particulars.length", "above zero"]),
+        ("mass = { value = ", "mass = { value = -", ["particulars.mass", "above zero"]),
+        ('unit = "rps"', 'unit = "rpm"', ["propeller.limits", "'rpm'", "unit 'rps'"]),
+        ("mixer = { dV = -1, dH = -1 }", "mixer = { dV = -1 }", ["planes.0.mixer.dH", "nothing"]),
+        ('mirror = "stern_plane_4"', 'mirror = "stern_plane_9"', ["planes", "stern_plane_9", "not a plane"]),
+    ],
+)
+def test_mistake_in_a_vehicle_is_named(tmp_path, old, new, words):
+    """Numbers are used as they are, so that a unit that is not the program's must not pass."""
+    text = (files("sim") / "vehicles" / "bb2.toml").read_text("utf-8")
+    assert old in text
+    path = tmp_path / "own.toml"
+    path.write_text(text.replace(old, new, 1))
+    with pytest.raises(InputError) as caught:
+        load_vehicle(path)
+    for word in words:
+        assert word in str(caught.value)
