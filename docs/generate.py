@@ -14,6 +14,11 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
+ROOT = Path(__file__).resolve().parents[1]
+# The documentation is of this checkout, whatever copy of the package is installed.
+sys.path.insert(0, str(ROOT))
+
+import ident
 from ident.calibrated import run as calibrate
 from ident.derivatives import derivatives
 from ident.figures import case_figure
@@ -25,7 +30,6 @@ from sim.case import load_case
 from sim.coefficients import Coefficients
 from sim.model import Environment
 
-ROOT = Path(__file__).resolve().parents[1]
 CASE = "hzz20"
 
 
@@ -173,6 +177,9 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--check", action="store_true", help="exit 1 when a block is not current")
     only_check = parser.parse_args().check
+    loaded = Path(ident.__file__).resolve().parents[1]
+    if loaded != ROOT:
+        raise SystemExit(f"ident was loaded from {loaded} before; run docs/generate.py by itself")
     with tempfile.TemporaryDirectory() as folder:
         db = str(Path(folder) / "coeff_db")
         fitted = fit(ROOT / "raw_captive_data", db)[0]

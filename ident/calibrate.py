@@ -30,7 +30,7 @@ from sim.case import Case, Series, load_case, load_reference
 from sim.coefficients import Coefficients
 from sim.errors import InputError
 from sim.in_waves import Water
-from sim.model import Assembly, Environment
+from sim.model import Assembly
 from sim.simulate import Simulation, environment_of, equipped, fly, water_of
 from sim.trim import NoEquilibrium
 from sim.vehicle import Vehicle
@@ -102,6 +102,7 @@ class Problem:
     chosen : Groups with priors.
     cases : Case name -> (case, abscissa).
     channels : Training series.
+    prepared : Case name -> assembly and water, made when a case is first flown.
     """
 
     vehicle: Vehicle
@@ -109,21 +110,23 @@ class Problem:
     chosen: list[Parameter]
     cases: dict[str, tuple[Case, str]]
     channels: list[Channel]
+    prepared: dict[str, tuple[Assembly, Water | None]] = field(default_factory=dict)
 
     def without(self, dropped: Callable[[Channel], bool]) -> Problem:
         """The same problem with some of the series left out."""
         kept = [c for c in self.channels if not dropped(c)]
         cases = {name: pair for name, pair in self.cases.items() if any(c.key[0] == name for c in kept)}
-        return Problem(self.vehicle, self.rows, self.chosen, cases, kept)
+        return Problem(self.vehicle, self.rows, self.chosen, cases, kept, self.prepared)
 
     def residuals(self, theta: Array) -> list[Array]:
         """Residuals of every series at multipliers ``theta``, in the references' units."""
         values = apply(self.rows["value"].to_numpy(), self.chosen, theta)
         flown: dict[str, Simulation | None] = {}
         for name, (case, _) in self.cases.items():
-            model = equipped(case, self.vehicle, self._assembly(case).model(values))
+            assembly, water = self._prepared(case)
+            model = equipped(case, self.vehicle, assembly.model(values))
             try:
-                flown[name] = fly(case, self.vehicle, model, self._water(case))
+                flown[name] = fly(case, self.vehicle, model, water)
             except NoEquilibrium:
                 flown[name] = None
         found = []
@@ -135,21 +138,12 @@ class Problem:
                 found.append(channel.residual(one, self.cases[channel.key[0]][1]))
         return found
 
-    def _assembly(self, case: Case) -> Assembly:
-        environment = environment_of(case)
-        if environment not in _CACHE or _CACHE[environment][0] is not self.rows:
-            assembly = Assembly(Coefficients(self.vehicle, self.rows), environment)
-            _CACHE[environment] = (self.rows, assembly)
-        return _CACHE[environment][1]
-
-    def _water(self, case: Case) -> Water | None:
-        if case.name not in _WATERS or _WATERS[case.name][0] is not self.rows:
-            _WATERS[case.name] = (self.rows, water_of(case, Coefficients(self.vehicle, self.rows)))
-        return _WATERS[case.name][1]
-
-
-_CACHE: dict[Environment, tuple[pd.DataFrame, Assembly]] = {}
-_WATERS: dict[str, tuple[pd.DataFrame, Water | None]] = {}
+    def _prepared(self, case: Case) -> tuple[Assembly, Water | None]:
+        """What the flights of a case have in common whatever the multipliers."""
+        if case.name not in self.prepared:
+            own = Coefficients(self.vehicle, self.rows)
+            self.prepared[case.name] = Assembly(own, environment_of(case)), water_of(case, own)
+        return self.prepared[case.name]
 
 
 @dataclass(frozen=True)

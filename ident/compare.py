@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ident.output import check_folder, whole
 from sim.database import axis_columns, find_version, own_version, read_rows
-from sim.errors import InputError
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -36,7 +36,7 @@ def difference(db: str, first: int, second: int) -> list[dict[str, Any]]:
         When the database or a version does not exist.
     """
     old, new = (_indexed(read_rows(db, v)[0]) for v in (first, second))
-    both = old.join(new, how="outer", lsuffix="_old", rsuffix="_new")
+    both = old.add_suffix("_old").join(new.add_suffix("_new"), how="outer")
     found = []
     for (vehicle, name), group in both.groupby(level=["vehicle", "coefficient"], sort=False):
         added, removed = group["value_old"].isna(), group["value_new"].isna()
@@ -81,21 +81,15 @@ def export(db: str, version: int | None, kind: str, folder: Path) -> dict[str, A
         For a missing database or version, a folder that is a file or cannot be written to.
     """
     rows, number = read_rows(db, version)
-    if folder.exists() and not folder.is_dir():
-        raise InputError(str(folder), "a file", "a folder for the export")
+    check_folder(folder)
     path = folder / f"coefficients_v{number}.{kind}"
-    part = path.with_suffix(".part")
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
+    with whole(path) as part:
         if kind == "parquet":
             rows.to_parquet(part, index=False)
         elif kind == "csv":
             rows.to_csv(part, index=False)
         else:
             rows.to_json(part, orient="records", indent=1, double_precision=15)
-        part.replace(path)
-    except OSError as error:
-        raise InputError(str(path), f"cannot be written: {error.strerror}", "a folder you may write to") from error
     own = {name: own_version(db, name, number) for name in rows["vehicle"].unique()}
     return {
         "file": str(path),

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ident.bands import Bands
+from ident.output import whole
 from ident.validate import Validation
 from sim.database import version_words
 from sim.simulate import CHANNELS, Simulation
@@ -143,8 +144,8 @@ def finish(figure: Any, path: Path, title: str, stamp: str) -> Path:
     ``path``.
     """
     figure.suptitle(f"{title}\n{stamp}; {FRAME}", fontsize=10)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(path, dpi=120)
+    with whole(path) as part:
+        figure.savefig(part, dpi=120)
     pyplot().close(figure)
     return path
 

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ident import sea_cases, turning, vertical
 from ident.metrics import roll_decay, zigzag
+from ident.sea_cases import InWaves
 from sim.case import Case, Series, in_radians
 from sim.simulate import Simulation
 
@@ -70,7 +72,7 @@ def _surfaced(case: Case, simulation: Simulation) -> bool:
     return False
 
 
-def _flown_only(case: Case, simulation: Simulation) -> tuple[Metrics, list[dict[str, float]] | None]:
+def _flown_only(case: Case, simulation: Simulation, waves: InWaves) -> tuple[Metrics, list[dict[str, float]] | None]:
     """Metrics that need the programme of the flight, and the curve of a spiral."""
     channels = channels_of(simulation)
     kind = case.maneuver
@@ -90,9 +92,9 @@ def _flown_only(case: Case, simulation: Simulation) -> tuple[Metrics, list[dict[
     if kind == "course_keeping":
         return vertical.course_keeping(channels, _first_step_end(simulation, _HORIZONTAL)), None
     if kind == "regular_waves":
-        return sea_cases.regular_waves(simulation), None
+        return sea_cases.regular_waves(waves.harmonics), None
     if kind == "irregular_waves":
-        return sea_cases.irregular_waves(simulation), None
+        return sea_cases.irregular_waves(waves.statistics, simulation), None
     if kind == "rise":
         return vertical.rise(channels, _surfaced(case, simulation)), None
     return {}, None
@@ -114,22 +116,32 @@ def _transposed(columns: dict[str, Metrics]) -> Columns:
     return {name: {label: column.get(name) for label, column in columns.items()} for name in names}
 
 
-def measured(
-    case: Case, simulation: Simulation, reference: Series, own: dict[str, Simulation]
-) -> tuple[Columns, list[dict[str, float]] | None]:
+@dataclass(frozen=True)
+class Measured:
+    """What was measured on a flight and on its references.
+
+    Attributes
+    ----------
+    metrics : name -> {"simulated", "simulated_as_<source>", each source, "published_model"}.
+    curve : The points of a spiral, or None.
+    in_waves : Harmonics or statistics of the flight, which the metrics are from.
+    """
+
+    metrics: Columns
+    curve: list[dict[str, float]] | None
+    in_waves: InWaves
+
+
+def measured(case: Case, simulation: Simulation, reference: Series, own: dict[str, Simulation]) -> Measured:
     """Metrics of the flight, of the flights from a source's own start, and of the references.
 
     Parameters
     ----------
     case, simulation, reference : What was flown and what it is held against.
     own : Flights from the start of a source's record, by source.
-
-    Returns
-    -------
-    metrics : name -> {"simulated", "simulated_as_<source>", each source, "published_model"}.
-    curve : The points of a spiral, or None.
     """
     flights = {"simulated": simulation} | {f"simulated_as_{k}": v for k, v in own.items()}
+    waves = {label: sea_cases.in_waves(case, flight) for label, flight in flights.items()}
     curve = None
     columns: dict[str, Metrics]
     if case.maneuver == "turning_circle":
@@ -143,7 +155,7 @@ def measured(
     elif case.maneuver is not None:
         columns = {}
         for label, flight in flights.items():
-            columns[label], found = _flown_only(case, flight)
+            columns[label], found = _flown_only(case, flight, waves[label])
             curve = found if label == "simulated" else curve
     elif case.initial.heel_deg and case.initial.state == "as_given":
         columns = _of_angle(case, reference, flights, "phi", None, lambda t, x, _: roll_decay(t, x))
@@ -155,7 +167,7 @@ def measured(
         for column in columns.values():
             column.setdefault(value.metric, None)
         columns.setdefault(value.source, {})[value.metric] = value.value
-    return _transposed(columns), curve
+    return Measured(_transposed(columns), curve, waves["simulated"])
 
 
 def _of_angle(

@@ -104,7 +104,7 @@ def read_facility(path: Path) -> Facility:
     """
     if path.suffix != ".toml":
         raise InputError(str(path), "not a .toml file", "a TOML file with a table for every test, see docs/checks.md")
-    data, where = read_toml(path, "vehicles")
+    data, where = read_toml(path, "")
     return checked(Facility, data, where)
 
 

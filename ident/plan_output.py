@@ -11,8 +11,8 @@ import pandas as pd
 
 from ident.campaign import Campaign, to_full_scale, turn
 from ident.findings import STATE
+from ident.output import whole
 from ident.plan import Plan
-from sim.errors import InputError
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -58,11 +58,8 @@ def write_matrix(plan: Plan, campaign: Campaign, path: Path) -> None:
     InputError
         When the file cannot be written.
     """
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        matrix(plan, campaign).to_csv(path, index=False)
-    except OSError as error:
-        raise InputError(str(path), f"cannot be written: {error.strerror}", "a path you may write to") from error
+    with whole(path) as part:
+        matrix(plan, campaign).to_csv(part, index=False)
 
 
 def show(plan: Plan, campaign: Campaign, console: Console) -> None:

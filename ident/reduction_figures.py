@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from ident.histories import Reduced
+from ident.output import whole
 
 _UNITS = {**dict.fromkeys("XYZ", "N"), **dict.fromkeys("KMN", "N m")}
 _POINTS = 2000
@@ -51,8 +52,8 @@ def history_figure(reduced: Reduced, path: Path) -> Path:
     axes[-1, 0].set_xlabel("time [s]")
     figure.suptitle(f"{reduced.run_id}: {reduced.kind}, {fit.verdict}"[:160], fontsize=9, wrap=True)
     figure.tight_layout()
-    path.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(path, dpi=110)
+    with whole(path) as part:
+        figure.savefig(part, dpi=110)
     plt.close(figure)
     return path
 

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import contextlib
 import csv
 import json
-import os
 import re
 from datetime import UTC, datetime
 from importlib.resources import files
@@ -17,13 +15,13 @@ import pandas as pd
 from ident.derivatives import checks, derivatives
 from ident.findings import SEVERITIES, spans
 from ident.notes import group_unused, group_warnings
+from ident.output import whole
 from ident.provenance import steps
 from ident.report_figures import draw_figures, equations, quality_colours
 from sim import catalogue
 from sim.catalogue import RULES, Term
 from sim.coefficients import Coefficients
 from sim.database import Version, axis_columns, own_version, read_rows
-from sim.errors import InputError
 from sim.frames import PROGRAM
 from sim.model import Environment
 from sim.parts import parts_of, vehicle_terms
@@ -227,19 +225,6 @@ def _severities(findings: list[dict[str, Any]] | None) -> dict[str, int] | None:
     return {s: sum(f.get("severity") == s for f in findings) for s in reversed(SEVERITIES)}
 
 
-def _write(path: Path, text: str) -> None:
-    """The whole file or nothing."""
-    temporary = path.with_name(f".{path.name}.{os.getpid()}")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        temporary.write_text(text, encoding="utf-8")
-        os.replace(temporary, path)
-    except OSError as error:
-        with contextlib.suppress(OSError):
-            temporary.unlink()
-        raise InputError(str(path), f"cannot be written: {error}", "a folder you may write to") from error
-
-
 def write_report(db: str, version: int | None, out: Path, vehicle: str = "bb2") -> Path:
     """``make_report``, for its file alone."""
     return Path(make_report(db, version, out, vehicle)["file"])
@@ -277,7 +262,8 @@ def make_report(db: str, version: int | None, out: Path, vehicle: str = "bb2") -
     content = _content(db, number, boat, rows, commit)
     page = templates.from_string(source).render(content)
     path = Path(out) / f"{re.sub(r'[^A-Za-z0-9._-]', '_', boat.name)}_v{number}.html"
-    _write(path, page)
+    with whole(path) as part:
+        part.write_text(page, encoding="utf-8")
     return {
         "file": str(path),
         "vehicle": boat.name,

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -10,8 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ident import seakeeping, seaway
-from ident.exceedance import exceedances
-from ident.seakeeping_published import as_published
+from ident.exceedance import exceedances, extreme
+from ident.seakeeping import Harmonics, as_published
+from ident.seaway import Statistics
+from sim.case import Case
 from sim.database import version_words
 from sim.simulate import Simulation
 from sim.waves import mean_direction
@@ -24,29 +28,61 @@ Metrics = dict[str, float | None]
 # The sail top at the calm surface: broaching.
 _BROACHING = 0.0
 _CHANNELS = ("D0", "theta", "phi")
+# An extreme is asked for over the duration of a sea state [h], and passed with this probability.
+_HOURS, _RISK = 3.0, 0.01
 
 
-def regular_waves(simulation: Simulation) -> Metrics:
+@dataclass(frozen=True)
+class InWaves:
+    """What is computed once of a flight in waves, for its metrics and figures; empty of any other.
+
+    Attributes
+    ----------
+    harmonics : Channel -> harmonics, in a regular wave.
+    statistics : Channel -> statistics, in an irregular sea.
+    """
+
+    harmonics: Mapping[str, Harmonics] = field(default_factory=dict)
+    statistics: Mapping[str, Statistics] = field(default_factory=dict)
+
+
+def in_waves(case: Case, simulation: Simulation) -> InWaves:
+    """Harmonics or statistics of a flight, as its case asks for; raises as those."""
+    if case.maneuver == "regular_waves":
+        return InWaves(harmonics=seakeeping.harmonics(simulation))
+    if case.maneuver == "irregular_waves":
+        return InWaves(statistics=seaway.statistics(simulation, _CHANNELS))
+    return InWaves()
+
+
+def regular_waves(found: Mapping[str, Harmonics]) -> Metrics:
     """First harmonics of depth over wave amplitude and of pitch, with means, of a flight in a regular wave."""
-    found = seakeeping.harmonics(simulation)
     own = as_published(found)
     return {
         "dz1_over_aw": own["dz1_over_aw"][0],
         "theta1_deg": own["theta1"][0],
         "dz1_over_aw_stderr": own["dz1_over_aw"][1],
         "theta1_stderr_deg": own["theta1"][1],
+        "speed_mean_mps": found["D0"].encounter.speed,
         "D0_mean_m": found["D0"].mean,
         "theta_mean_deg": math.degrees(found["theta"].mean),
         "frequency_of_encounter_radps": found["D0"].encounter.frequency,
     }
 
 
-def irregular_waves(simulation: Simulation) -> Metrics:
-    """Significant values (double amplitude), and how often the sail top comes out a hour."""
-    found = seaway.statistics(simulation, _CHANNELS)
-    broaching = exceedances(found["D0"], [_BROACHING])[0]
+def irregular_waves(found: Mapping[str, Statistics], simulation: Simulation) -> Metrics:
+    """Significant values (double amplitude), least depths, and how often the sail top comes out a hour.
+
+    The least depth is that of the whole record, start-up included; beside it the one that Rice's
+    rate lets expect in as much time as the statistics are of and in three hours, and the one that
+    is passed in three hours with 1 %.
+    """
     depth, pitch, roll = (found[name] for name in _CHANNELS)
+    broaching = exceedances(depth, [_BROACHING])[0]
+    record = extreme(depth, (depth.end - depth.start) / 3600.0)
+    sea_state = extreme(depth, _HOURS, risk=_RISK)
     return {
+        "statistics_from_s": depth.start,
         "D0_mean_m": depth.mean,
         "D0_significant_m": depth.significant,
         "D0_significant_stderr_m": 4.0 * depth.sigma_stderr,
@@ -55,6 +91,9 @@ def irregular_waves(simulation: Simulation) -> Metrics:
         "phi_significant_deg": math.degrees(roll.significant),
         "D0_period_s": depth.period,
         "D0_least_m": float(simulation["D0"].min()),
+        "D0_least_rice_m": record["expected"],
+        "D0_least_3h_rice_m": sea_state["expected"],
+        "D0_least_3h_1percent_rice_m": sea_state["at_risk"],
         "broaching_per_hour": broaching.per_hour,
         "broaching_per_hour_rice": broaching.predicted,
     }
@@ -107,7 +146,7 @@ def sea_figures(done: Validation, folder: Path) -> list[Path]:
     database = done.result["database"]
     stamp = version_words(database)
     title, name = f"{done.case.title}, {done.case.vehicle}", f"{done.case.name}_v{database['version']}"
-    found = seaway.statistics(done.simulation, _CHANNELS)
+    found = done.in_waves.statistics
     met = seaway.encountered(done.simulation.waves, done.simulation, start=found["D0"].start)
     return [
         seaway_figure(done.simulation, found, folder / f"{name}_histories.png", title, stamp, _BROACHING),
@@ -116,8 +155,8 @@ def sea_figures(done: Validation, folder: Path) -> list[Path]:
     ]
 
 
-def harmonics_over_depth(done: list[Validation], folder: Path) -> Path | None:
-    """First harmonics over depth of every case in regular waves that was flown, beside the published ones.
+def harmonics_over_depth(done: list[Validation], folder: Path) -> list[Path]:
+    """First harmonics over depth of the cases in a regular wave that were flown, beside the published ones.
 
     Parameters
     ----------
@@ -126,27 +165,40 @@ def harmonics_over_depth(done: list[Validation], folder: Path) -> Path | None:
 
     Returns
     -------
-    The figure; None when no case is in regular waves.
+    A figure for each vehicle and wave; none when no case is in regular waves.
     """
+    groups: dict[str, list[Validation]] = {}
+    for one in done:
+        if one.in_waves.harmonics and one.case.waves is not None:
+            depth = one.case.initial.depth_m
+            key = f"{one.case.vehicle} {one.case.initial.speed_mps} {one.case.waves.model_dump_json()}"
+            while any(other.case.initial.depth_m == depth for other in groups.get(key, [])):
+                key += " again"
+            groups.setdefault(key, []).append(one)
+    return [_over_depth(group, folder, f"_{i + 1}" if i else "") for i, group in enumerate(groups.values())]
+
+
+def _over_depth(done: list[Validation], folder: Path, suffix: str) -> Path:
+    """The figure of one vehicle in one wave."""
     import pandas as pd
 
     from ident.seakeeping_figures import harmonics_figure
 
-    chosen = [d for d in done if d.case.maneuver == "regular_waves"]
-    if not chosen:
-        return None
-    flown = {d.case.initial.depth_m: seakeeping.harmonics(d.simulation) for d in chosen}
-    metric = {"dz1_over_aw": ("dz1_over_aw", "-"), "theta1_deg": ("theta1", "deg")}
+    metric = {"dz1_over_aw": "dz1_over_aw", "theta1_deg": "theta1"}
     rows = [
-        {"source": p.source, "channel": metric[p.metric][0], "D0_m": d.case.initial.depth_m}
-        | {"value": p.value, "unit": metric[p.metric][1], "sigma": 0.0}
-        for d in chosen
+        {"source": p.source, "channel": metric[p.metric], "D0_m": d.case.initial.depth_m}
+        | {"value": p.value, "sigma": p.sigma or 0.0}
+        for d in done
         for p in d.case.published
         if p.metric in metric
     ]
-    columns = ["source", "channel", "D0_m", "value", "unit", "sigma"]
-    database = chosen[0].result["database"]
-    stamp = version_words(database)
-    path = folder / f"harmonics_in_waves_v{database['version']}.png"
-    title = f"First harmonics in regular head waves, {chosen[0].case.vehicle}"
-    return harmonics_figure(flown, pd.DataFrame(rows, columns=columns), path, title, stamp)
+    reference = pd.DataFrame(rows, columns=["source", "channel", "D0_m", "value", "sigma"])
+    flown = {d.case.initial.depth_m: d.in_waves.harmonics for d in done}
+    database, case = done[0].result["database"], done[0].case
+    encounter = next(iter(done[0].in_waves.harmonics.values())).encounter
+    wave = f"waves {2.0 * encounter.amplitude:.3g} m high, {2.0 * math.pi / encounter.number:.4g} m long"
+    # mu is 180 deg in head seas.
+    title = f"{case.vehicle} in regular {wave}, mu = {math.degrees(encounter.angle):.0f} deg"
+    title += f", U = {encounter.speed:.3g} m/s"
+    path = folder / f"harmonics_in_waves{suffix}_v{database['version']}.png"
+    return harmonics_figure(flown, reference, path, title, version_words(database))

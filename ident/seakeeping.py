@@ -122,6 +122,18 @@ class Harmonics:
         return own | {"periods": self.periods, "transfer": value, "transfer_stderr": error}
 
 
+def as_published(found: Mapping[str, Harmonics]) -> dict[str, tuple[float, float]]:
+    """``dz1_over_aw`` [-] and ``theta1`` [deg] with standard errors, of depth (D0 or z) and pitch."""
+    own: dict[str, tuple[float, float]] = {}
+    depth = found.get("D0", found.get("z"))
+    if depth is not None:
+        own["dz1_over_aw"] = depth.transfer
+    if "theta" in found:
+        pitch = found["theta"]
+        own["theta1"] = math.degrees(pitch.amplitude[0]), math.degrees(pitch.amplitude_stderr[0])
+    return own
+
+
 def channel_unit(channel: str) -> str:
     """Unit of a channel of a simulation; planes and commands are in radians."""
     return CHANNELS.get(channel, "rad")

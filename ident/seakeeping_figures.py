@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 
 from ident.exceedance import Side, exceedances, rice_rate
 from ident.figures import DOWNWARDS, dress, finish, pyplot, readable
-from ident.seakeeping import Harmonics
-from ident.seakeeping_published import as_published
+from ident.seakeeping import Harmonics, as_published
 from ident.seaway import Statistics, spectrum, uniform_step
 from sim.simulate import Simulation
 
@@ -209,7 +208,8 @@ def harmonics_figure(
     Parameters
     ----------
     flown : Depth of the sail top D0 [m] -> harmonics.
-    reference : From ``seakeeping_published.read_published``; may be empty.
+    reference : Published values: source, channel (``dz1_over_aw`` [-], ``theta1`` [deg]), D0_m,
+        value, and sigma, the standard error of reading it; may be empty.
     path, title, stamp : As in ``seaway_figure``.
 
     Returns
@@ -229,6 +229,7 @@ def harmonics_figure(
             style = {"label": str(source), "color": "tab:gray", "marker": "v", "ls": ""} | _STYLES.get(str(source), {})
             axis.errorbar(rows["D0_m"], rows["value"], yerr=2.0 * rows["sigma"], ms=6, capsize=3, **style)
         dress(axis, "depth of the sail top D0 [m]", _LABEL_OF[channel])
+        axis.margins(0.08)
         axis.set_ylim(bottom=0.0)
         axis.set_xlim(left=0.0)
     figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=4, frameon=False)

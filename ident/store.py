@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ident import __version__
 from ident.identify import Identification
 from ident.published import TEST as PUBLISHED
-from sim.database import COUNTS, NUMBERS, axis_columns, column_order, read_rows, to_column, versions
+from sim.database import COUNTS, NUMBERS, axis_columns, brief, column_order, read_rows, to_column, versions
 from sim.errors import InputError
 from sim.parts import parts_of, vehicle_terms
 
@@ -203,11 +203,13 @@ def _commit(path: str, rows: pd.DataFrame, metadata: dict[str, str]) -> tuple[in
         except CommitFailedError as error:
             # Another fit committed in between: look again, then give up.
             if attempt == _TRIES - 1:
-                raise InputError(path, f"another fit wrote at the same time: {error}", "run the fit again") from error
+                raise InputError(
+                    path, f"another fit wrote at the same time: {brief(error)}", "run the fit again"
+                ) from error
             continue
         except DeltaError as error:
             raise InputError(
-                path, f"the database refused the version: {error}", "a database `ident fit` wrote"
+                path, f"the database refused the version: {brief(error)}", "a database `ident fit` wrote"
             ) from error
         return _own_version(path, content), True
     raise AssertionError("unreachable: the last try returns or raises")

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ident.boats import Boat, Fleet
 from ident.coverage import outside_tables
 from ident.measure import measured
+from ident.sea_cases import InWaves
 from ident.sweep import with_grid
 from sim.case import Case, Reference, Series, load_case, load_reference, read_series
 from sim.database import axis_columns, version_words
@@ -41,6 +42,7 @@ class Validation:
     constant_axes : Term -> axes along which it was measured at one value only.
     boat : The vehicle with its coefficients.
     own : Flights from the start of a source's record, by source.
+    in_waves : Harmonics or statistics of a flight in waves.
     """
 
     case: Case
@@ -50,6 +52,7 @@ class Validation:
     constant_axes: dict[str, list[str]]
     boat: Boat
     own: dict[str, Simulation]
+    in_waves: InWaves
 
 
 def rmse(simulation: Simulation, channel: str, series: tuple[Array, Array, str], abscissa: str = "t") -> float:
@@ -200,8 +203,8 @@ def _with_reference(case: Case, path: Path, frame: str | None) -> tuple[Case, Se
     declared = case.reference.frame if case.reference and not frame else _FRAMES[frame or "program"]
     if not path.is_file():
         raise InputError(str(path), "no such file", "a CSV file: source, channel, t or s, value, unit")
-    header = path.open(encoding="utf-8").readline().strip().split(",")
-    abscissa: Literal["t", "s"] = "s" if "s" in header and "t" not in header else "t"
+    header = path.read_bytes().partition(b"\n")[0].strip().split(b",")
+    abscissa: Literal["t", "s"] = "s" if b"s" in header and b"t" not in header else "t"
     series = read_series(path, abscissa, declared.declared(f"case {case.name}, key reference.frame"))
     model = case.reference.published_model if case.reference else None
     compare = [s for s in series.data if s != model]
@@ -259,8 +262,13 @@ def validate(
     case = case.model_copy(update={"vehicle": vehicle.name})
     boat = (fleet or Fleet(db, version)).boat(vehicle)
     simulation, own = flights(case, boat)
+    for one in (simulation, *own.values()):
+        if len(one["t"]) < 2:
+            found_at = f"the run ends at {one.end[0]:.3f} s, before a second record"
+            raise InputError(f"{where}, key run", found_at, "a run of two records or more; events that happen later")
     found = errors(case, reference, simulation, own)
-    metrics, curve = measured(case, simulation, reference, own)
+    found_on = measured(case, simulation, reference, own)
+    metrics, curve = found_on.metrics, found_on.curve
     model = boat.model(case)
     grid = with_grid(case, vehicle, model, metrics)
     outside, constant = outside_tables(simulation, boat.coefficients, model)
@@ -277,7 +285,7 @@ def validate(
         "ends_s": float(simulation.end[0]),
         "passed": bool(_complete(simulation) and _passed(case, found) and _published_met(case, metrics)),
     }
-    return Validation(case, simulation, reference, result, constant, boat, own)
+    return Validation(case, simulation, reference, result, constant, boat, own, found_on.in_waves)
 
 
 def _complete(simulation: Simulation) -> bool:
@@ -332,8 +340,11 @@ def show(done: Validation, console: Console) -> None:
         console.print(f"the run ended at {done.result['ends_s']:.1f} s by an event of the case", highlight=False)
     if float(done.simulation["D0"].min()) < 0.0:
         console.print("[red]the sail top left the water; the model holds for a fully submerged boat only[/]")
-    verdict = "[green]within[/]" if result["passed"] else "[red]outside[/]"
-    console.print(f"{verdict} the tolerances of the case file")
+    if not done.case.tolerance and all(p.tolerance is None for p in done.case.published):
+        console.print("the case states no tolerance")
+    else:
+        verdict = "[green]within[/]" if result["passed"] else "[red]outside[/]"
+        console.print(f"{verdict} the tolerances of the case file")
 
 
 def _show_grid(grid: list[dict[str, Any]], console: Console) -> None:

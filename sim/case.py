@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -134,6 +135,8 @@ class Run(Data):
             raise ValueError(f"more than {_MOST_STEPS:g} steps")
         if self.record_s < self.step_s:
             raise ValueError("record_s is shorter than step_s")
+        if self.record_s > self.duration_s:
+            raise ValueError("record_s is longer than duration_s: the record would hold the start alone")
         return self
 
 
@@ -176,13 +179,17 @@ class Sweep(Data):
 
 
 class Published(Data):
-    """A published value of one metric, and the relative deviation that is accepted."""
+    """A published value of one metric, and the relative deviation that is accepted.
+
+    ``sigma``: standard error of reading it, in its unit.
+    """
 
     metric: str
     source: str
     value: float
     unit: str
     note: str
+    sigma: Annotated[float, Field(ge=0)] | None = None
     tolerance: Positive | None = None
 
 
@@ -213,6 +220,15 @@ class Case(Data):
     reference: Reference | None = None
     published: list[Published] = Field(default_factory=list)
     tolerance: list[Tolerance] = Field(default_factory=list)
+
+    @model_validator(mode="after")
+    def _starts_below_the_surface(self) -> Case:
+        starts: list[Initial | Start] = [self.initial, *(self.reference.initial.values() if self.reference else [])]
+        depths = [s.depth_m for s in starts if s.depth_m is not None] + (self.sweep.depth_m if self.sweep else [])
+        if min(depths) < 0.0 and not (self.environment.free_surface or self.waves):
+            text = f"depth_m {min(depths):g} has the sail top above the surface; D0 is positive down, 0 or more"
+            raise ValueError(f"{text}, or free_surface = true in [environment]")
+        return self
 
     def started_as(self, source: str) -> Case | None:
         """This case from the start of one source's record; None when it is the case's own."""
@@ -266,14 +282,16 @@ def load_case(name: str | Path) -> tuple[Case, str]:
 
 
 def _numbers(table: pd.DataFrame, column: str, path: Path) -> None:
-    """Make a column numbers. Raises ``InputError`` naming the row that is not."""
+    """Make a column numbers; only values may be negative. Raises ``InputError`` naming the row that is not."""
     import pandas as pd
 
     numbers = pd.to_numeric(table[column], errors="coerce").astype(float)
-    bad = np.flatnonzero(~np.isfinite(numbers))
+    least = -math.inf if column == "value" else 0.0
+    bad = np.flatnonzero(~np.isfinite(numbers) | (numbers < least))
     if bad.size:
-        place = f"{path}, row {bad[0] + 2}, column {column}"
-        raise InputError(place, repr(table[column].iloc[bad[0]]), "a finite number")
+        place, given = f"{path}, row {bad[0] + 2}, column {column}", table[column].iloc[bad[0]]
+        allowed = "a finite number" if column == "value" else "a finite number, zero or more"
+        raise InputError(place, "nothing or nan" if pd.isna(given) else repr(str(given)), allowed)
     table[column] = numbers
 
 
@@ -310,6 +328,10 @@ def read_series(path: Path, abscissa: Literal["t", "s"], frame: Frame) -> Series
     for column in ("source", "channel", abscissa, "value", "unit"):
         if column not in table:
             raise InputError(str(path), f"column {column} missing", f"source, channel, {abscissa}, value, unit")
+    for column in ("source", "channel", "unit"):
+        blank = np.flatnonzero(table[column].isna())
+        if blank.size:
+            raise InputError(f"{path}, row {blank[0] + 2}, column {column}", "nothing", f"a {column}")
     for column in (abscissa, "value", *(["sigma"] if "sigma" in table else [])):
         _numbers(table, column, path)
     data: dict[str, dict[str, tuple[Array, Array, str]]] = {}

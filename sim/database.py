@@ -88,6 +88,12 @@ class Version:
         return self.metadata.get("digest", "")
 
 
+def brief(error: Exception) -> str:
+    """What the storage engine says, in one line and without its own trace."""
+    lines = str(error).split("   0: ")[0].splitlines()
+    return " ".join(line.strip(" \t↳") for line in lines if line.strip())[:300]
+
+
 def open_table(path: str, version: int | None = None) -> Any:
     """The Delta table at ``path``, at a version.
 
@@ -106,7 +112,9 @@ def open_table(path: str, version: int | None = None) -> Any:
     try:
         table = DeltaTable(path)
     except (TableNotFoundError, DeltaError, OSError) as error:
-        raise InputError(path, f"not a coefficient database: {error}", "a database written by `ident fit`") from error
+        raise InputError(
+            path, f"not a coefficient database: {brief(error)}", "a database written by `ident fit`"
+        ) from error
     latest = table.version()
     if version is not None:
         if not 0 <= version <= latest:
@@ -137,7 +145,7 @@ def read_rows(path: str, version: int | None = None, vehicle: str | None = None)
         rows = table.to_pyarrow_table().to_pandas().reindex(columns=column_order())
     except (OSError, DeltaError) as error:
         raise InputError(
-            path, f"version {table.version()} cannot be read: {error}", "all files of the version"
+            path, f"version {table.version()} cannot be read: {brief(error)}", "all files of the version"
         ) from error
     if vehicle is not None:
         known = sorted(rows["vehicle"].unique())
@@ -185,7 +193,13 @@ def own_version(path: str, vehicle: str, number: int) -> Version:
     path : Folder or object-store URL of the database.
     vehicle : Vehicle name.
     number : Version that holds the rows.
+
+    Raises
+    ------
+    InputError
+        When there is no such version.
     """
+    open_table(path, number)
     history = versions(path)
     up_to = [v for v in history if v.number <= number]
     return last_own(history, vehicle, number) or (up_to or [Version(number, "", {})])[-1]

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from pydantic import ValidationError
+from difflib import get_close_matches
+from typing import Any, get_args
+
+from pydantic import BaseModel, ValidationError
 
 
 class InputError(Exception):
@@ -20,13 +23,43 @@ class InputError(Exception):
         self.where, self.found, self.allowed = where, found, allowed
 
 
-def explain(where: str, error: ValidationError) -> InputError:
-    """The first problem pydantic found, as an ``InputError``."""
-    first = error.errors()[0]
+def _known(kind: type[BaseModel], place: tuple[int | str, ...]) -> list[str]:
+    """Keys of the part of a file that a pydantic location without its last entry leads to."""
+    found: type[BaseModel] | None = kind
+    for part in place[:-1]:
+        if isinstance(part, str) and found is not None and part in found.model_fields:
+            found = _model_in(found.model_fields[part].annotation)
+    return list(found.model_fields) if found is not None else []
+
+
+def _model_in(annotation: Any) -> type[BaseModel] | None:
+    """The model inside an annotation such as ``list[Model] | None``."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return annotation
+    return next((m for a in get_args(annotation) if (m := _model_in(a)) is not None), None)
+
+
+def _shown(given: Any) -> str:
+    """What was given, short: of a part of a file its plain entries."""
+    if not isinstance(given, dict):
+        return repr(given)[:80]
+    plain = [f"{k} = {v!r}" for k, v in given.items() if isinstance(v, str | int | float) and len(repr(v)) <= 24]
+    return ", ".join(plain)[:120] or repr(given)[:80]
+
+
+def explain(where: str, error: ValidationError, kind: type[BaseModel]) -> InputError:
+    """One problem that pydantic found, as an ``InputError``; an unknown key says more than the one it is not."""
+    problems = error.errors()
+    first = next((p for p in problems if p["type"] == "extra_forbidden"), problems[0])
     key = ".".join(str(k) for k in first["loc"]) or "the file"
-    given = first.get("input")
-    shown = "nothing" if first["type"] == "missing" else repr(given)[:80]
-    allowed = "this key" if first["type"] == "missing" else first["msg"].removeprefix("Value error, ")
-    more = error.error_count() - 1
+    shown, allowed = _shown(first.get("input")), first["msg"].removeprefix("Value error, ")
+    if first["type"] == "missing":
+        shown, allowed = "nothing", "this key"
+    elif first["type"] == "extra_forbidden":
+        known = _known(kind, first["loc"])
+        near = get_close_matches(str(first["loc"][-1]), known, 1)
+        shown = f"unknown key, {shown}"
+        allowed = (f"{near[0]}? One of " if near else "one of ") + ", ".join(known)
+    more = len(problems) - 1
     rest = f"; {more} more problem{'s' if more > 1 else ''}" if more else ""
-    return InputError(f"{where}, key {key}", f"{shown}", f"{allowed}{rest}")
+    return InputError(f"{where}, key {key}", shown, f"{allowed}{rest}")

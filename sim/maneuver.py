@@ -275,6 +275,7 @@ def run(
     record: np.ndarray,
     executes: np.ndarray,
     log: np.ndarray,
+    start: float,
 ) -> tuple[int, int, int, float]:
     """Integrate a maneuver.
 
@@ -288,6 +289,7 @@ def run(
     record : (rows, 1 + 12 + controls + 2) filled with time, state, controls, commands.
     executes : (k, 2) filled with time and command [rad] of each zigzag execute.
     log : (k, 3) filled with time, axis and step of each step of a programme that ended.
+    start : Time at the start [s]; a run may go on from where another ended.
 
     Returns
     -------
@@ -301,28 +303,28 @@ def run(
     zigzag = s.law[0] == ZIGZAG or s.law[1] == ZIGZAG
     axis = HORIZONTAL if s.law[1] == ZIGZAG else VERTICAL
     if zigzag:
-        executes[0, 0], executes[0, 1], events = 0.0, s.value[axis], 1
+        executes[0, 0], executes[0, 1], events = start, s.value[axis], 1
     for step in range(steps + 1):
-        prepare(work.around, y, step * dt)
+        prepare(work.around, y, start + step * dt)
         rhs(m, y, c, work, dy)
         if programmed:
-            watch(s.programme, state, y, dy, step * dt)
+            watch(s.programme, state, y, dy, start + step * dt)
         read[:], change[:] = y, dy
         if s.pressure_depth:
             read_gauge(work.around, read, change)
         autopilot(s, read, change, state, integrals, dt, command)
         if step % every == 0 and rows < record.shape[0]:
-            record[rows, 0] = step * dt
+            record[rows, 0] = start + step * dt
             record[rows, 1:13] = y
             record[rows, 13 : 13 + c.size] = c
             record[rows, 13 + c.size : 15 + c.size] = command[:2]
             rows += 1
         if step == steps or not np.isfinite(y).all():
-            return rows, events, logged, step * dt
+            return rows, events, logged, start + step * dt
         _actuators(s, command, c, dt, rate)
         left = dt
         while left > 0.0:
-            now = step * dt + (dt - left)
+            now = start + step * dt + (dt - left)
             rk4(m, y, c, rate, left, work, stages, trial)
             part = left
             happens = (zigzag or programmed) and _past(s, state, trial, now + left) >= 0.0
@@ -335,7 +337,7 @@ def run(
             left -= part
             if not happens:
                 continue
-            now = step * dt + (dt - left)
+            now = start + step * dt + (dt - left)
             if zigzag and _past_check(s, y, state.sense[0]) >= 0.0:
                 state.sense[0] = -state.sense[0]
                 command[axis] = state.sense[0] * s.value[axis]
@@ -349,7 +351,7 @@ def run(
                     return rows, events, logged, now
             _actuators(s, command, c, max(left, _EVENT_TOLERANCE), rate)
             prepare(work.around, y, now)
-    return rows, events, logged, steps * dt
+    return rows, events, logged, start + steps * dt
 
 
 class Flown(NamedTuple):
@@ -382,7 +384,7 @@ def fly_logged(
     executes, log = np.zeros((256, 2)), np.zeros((256, 3))
     y, c, state = y0.copy(), c0.copy(), progress(settings.programme, y0)
     work = workspace(len(settings.mixer), around)
-    rows, events, logged, end = run(model, settings, state, y, c, dt, steps, every, work, record, executes, log)
+    rows, events, logged, end = run(model, settings, state, y, c, dt, steps, every, work, record, executes, log, 0.0)
     flown = record[:rows]
     finite = flown[np.isfinite(flown).all(axis=1)]
     return Flown(finite, executes[: min(events, len(executes))], log[:logged], np.append(end, y))

@@ -291,21 +291,6 @@ def scattering(body: DipoleBody, number: float, kappa: Complex, velocity: Comple
     return Scattering(dipoles, motion, velocity + (answer @ d).T.reshape(-1, n, 3), force)
 
 
-def kochin(body: DipoleBody, number: float, dipoles: Complex, angles: Array) -> Complex:
-    """Kochin function of dipoles: far away phi = -i k/2 sqrt(2/(pi k R)) exp(i k R - i pi/4 - k z) H.
-
-    Parameters
-    ----------
-    dipoles : (m, n, 3) [kg m/s]. angles : (c,) [rad].
-
-    Returns
-    -------
-    (m, c) H, without the decay exp(-k z) down to the origin [m^3/s].
-    """
-    g = plane_waves(body, number, angles)[1]
-    return -np.einsum("cni,mni->mc", g.conj(), dipoles) / body.density
-
-
 def mean_loads(body: DipoleBody, frequency: float, headings: Array, speeds: Array, depths: Array) -> MeanLoads:
     """Mean loads in regular waves of unit amplitude.
 

@@ -69,4 +69,4 @@ def checked(kind: type[Checked], data: dict[str, Any], where: str) -> Checked:
     try:
         return kind.model_validate(data)
     except ValidationError as error:
-        raise explain(where, error) from error
+        raise explain(where, error, kind) from error

@@ -17,7 +17,7 @@ from pydantic import Field
 from sim.errors import InputError
 from sim.mesh import Array, Index, Mesh, MeshError, closed_part, joined
 from sim.schema import Data, FrameData, checked
-from sim.vehicle import Triple, read_toml
+from sim.vehicle import Place, read_toml
 
 _FOIL_COLUMNS = [
     "span_x",
@@ -76,7 +76,7 @@ class Geometry(Data):
     name: str
     source: str
     frame: FrameData
-    origin: Triple
+    origin: Place
     parts: Annotated[list[Annotated[HullPart | SailPart | FoilParts, Field(discriminator="kind")]], Field(min_length=1)]
 
 

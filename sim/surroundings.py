@@ -19,11 +19,12 @@ from numba import njit
 from numba.extending import overload
 from numpy.typing import NDArray
 
-from sim import wave_loads
+from sim import wave_passage
 from sim.emergence import Cells, lost_buoyancy
 from sim.pressure import box_top
 from sim.wave_drift import Drift, add_mean
-from sim.wave_loads import FORCE, WATER, WATER_RATE, Passage, Sea
+from sim.wave_loads import FORCE, WATER, Passage, Sea
+from sim.wave_passage import WATER_RATE
 
 Array = NDArray[np.float64]
 
@@ -42,7 +43,7 @@ class Surroundings(NamedTuple):
     specific_weight : rho g [N/m^3].
     clock : (3,) time at the start of the step, now, and of ``found`` [s]; the last negative
         when that is not known.
-    found : (n,) wave quantities now, in the layout of ``sim.wave_loads.interpolate``.
+    found : (n,) wave quantities now, in the layout of ``sim.wave_passage.interpolate``.
     felt : (12,) state with velocities relative to the water. lost : (6,) load of emergence
         [N, N m]. dry : (k,) emerged volume by section [m^3]. wet : (6, 6) added mass of the wet
         part. mean : (6,) second-order loads [N, N m]. emerged : (1,) emerged share of the volume.
@@ -124,7 +125,7 @@ def prepare(around: Around, y: Array, time: float) -> None:
     around.clock[0] = around.clock[1] = time
     around.clock[2] = -1.0
     if around.waves:
-        wave_loads.advance(around.sea, y, time, around.sums)
+        wave_passage.advance(around.sea, y, time, around.sums)
 
 
 def tick(around: Around, offset: float) -> None:
@@ -139,7 +140,7 @@ def observe(around: Around, y: Array) -> None:
     if around.waves:
         # Two stages of a step are at the same time.
         if around.clock[2] != around.clock[1]:
-            wave_loads.interpolate(around.time, around.value, around.slope, around.clock[1], around.found)
+            wave_passage.interpolate(around.time, around.value, around.slope, around.clock[1], around.found)
             around.clock[2] = around.clock[1]
         for i in range(6):
             around.felt[i] -= around.found[WATER + i]
@@ -154,7 +155,7 @@ def read_gauge(around: Around, state: Array, rate: Array) -> None:
     state, rate : (12,) of the boat at the time of the clock; entry 8 is changed.
     """
     if around.waves:
-        head, change = wave_loads.gauge(around.sea, around.sums, around.clock[1])
+        head, change = wave_passage.gauge(around.sea, around.sums, around.clock[1])
         state[8] += head
         rate[8] += change
 

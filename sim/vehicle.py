@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import Field, field_validator
+from pydantic import AfterValidator, Field, field_validator
 
 from sim.errors import InputError
 from sim.frames import PROGRAM, Frame
@@ -41,26 +41,46 @@ class Limits(Data):
     source: str
 
 
+def _stated(unit: str, positive: bool = False) -> AfterValidator:
+    """Numbers are taken as they are: what states another unit, or a size that is none, is refused."""
+
+    def check(given: Number | Triple | Limits) -> Number | Triple | Limits:
+        if given.unit != unit:
+            raise ValueError(f"unit {unit!r}, and the value in it")
+        if positive and isinstance(given, Number) and not given.value > 0.0:
+            raise ValueError("a value above zero")
+        if isinstance(given, Limits) and not given.value[0] < given.value[1]:
+            raise ValueError("the lower limit, then the upper one")
+        return given
+
+    return AfterValidator(check)
+
+
+Length = Annotated[Number, _stated("m", positive=True)]
+Mass = Annotated[Number, _stated("kg", positive=True)]
+Place = Annotated[Triple, _stated("m")]
+
+
 class Particulars(Data):
     """Mass, inertia and reference points; positions from the body origin."""
 
-    length: Number
-    mass: Number
-    displaced_mass: Number
-    radius_of_gyration: Triple
-    centre_of_gravity: Triple
-    centre_of_buoyancy: Triple
-    sail_top: Triple
+    length: Length
+    mass: Mass
+    displaced_mass: Mass
+    radius_of_gyration: Place
+    centre_of_gravity: Place
+    centre_of_buoyancy: Place
+    sail_top: Place
 
 
 class Propeller(Data):
     """Propeller diameter, the limits of its revolutions, and where it is (waves need that)."""
 
     name: str
-    diameter: Number
-    limits: Limits
-    rate: Number
-    position: Triple | None = None
+    diameter: Length
+    limits: Annotated[Limits, _stated("rps")]
+    rate: Annotated[Number, _stated("rps/s", positive=True)]
+    position: Place | None = None
 
 
 class Mixer(Data):
@@ -108,16 +128,16 @@ class Sections(Data):
 class BallastTank(Data):
     """Water taken in and pumped out: where, how much, how fast."""
 
-    position: Triple
-    limit: Number
-    rate: Number
+    position: Place
+    limit: Mass
+    rate: Annotated[Number, _stated("kg/s", positive=True)]
 
 
 class TrimTank(Data):
     """Water moved along the boat, as the shift of the centre of gravity: how far, how fast."""
 
-    limit: Number
-    rate: Number
+    limit: Length
+    rate: Annotated[Number, _stated("m/s", positive=True)]
 
 
 class Tanks(Data):
@@ -201,7 +221,7 @@ def read_toml(name: str | Path, kind: str, named_in: str = "") -> tuple[dict[str
     Parameters
     ----------
     name : The name or path.
-    kind : ``vehicles`` or ``cases``.
+    kind : ``vehicles`` or ``cases``; empty where none are bundled.
     named_in : File and key that name it, for the message.
 
     Raises
@@ -210,20 +230,22 @@ def read_toml(name: str | Path, kind: str, named_in: str = "") -> tuple[dict[str
         When neither a bundled file nor a readable TOML file of that name exists.
     """
     path = Path(name)
-    if path.suffix != ".toml" and str(name) in bundled(kind):
+    if kind and path.suffix != ".toml" and str(name) in bundled(kind):
         return tomllib.loads((files("sim") / kind / f"{name}.toml").read_text("utf-8")), str(name)
     try:
         there = path.is_file()
     except OSError:
         there = False
     if not there:
-        found, text = "no such file or bundled name", f"one of {', '.join(bundled(kind))}, or a path"
+        found, text = "no such file", "a path to a .toml file"
+        if kind:
+            found, text = "no such file or bundled name", f"one of {', '.join(bundled(kind))}, or a path"
         if named_in:
             raise InputError(named_in, f"{str(name)[:200]!r}: {found}", text)
         raise InputError(str(name)[:200], found, text)
     try:
         return tomllib.loads(path.read_text("utf-8")), str(path)
-    except (ValueError, RecursionError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         raise InputError(str(path), f"not TOML: {error}", "a TOML file in UTF-8") from error
 
 

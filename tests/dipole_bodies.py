@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sim.mean_loads import DipoleBody
+from sim.mean_loads import DipoleBody, plane_waves
 from sim.model import cross_matrix
 
 RHO, G = 1025.0, 9.81
@@ -45,3 +45,18 @@ def assembled(points, displaced, added, inertia, free):
         motion = np.hstack([np.eye(3), -cross_matrix(r)])
         total += motion.T @ (m[:, None] * motion)
     return DipoleBody(points, displaced, added, total, np.zeros((6, 6)), free, RHO, G)
+
+
+def kochin(body, number, dipoles, angles):
+    """Kochin function of dipoles: far away phi = -i k/2 sqrt(2/(pi k R)) exp(i k R - i pi/4 - k z) H.
+
+    Parameters
+    ----------
+    dipoles : (m, n, 3) [kg m/s]. angles : (c,) [rad].
+
+    Returns
+    -------
+    (m, c) H, without the decay exp(-k z) down to the origin [m^3/s].
+    """
+    g = plane_waves(body, number, angles)[1]
+    return -np.einsum("cni,mni->mc", g.conj(), dipoles) / body.density

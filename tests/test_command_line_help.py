@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import shutil
 import subprocess
 import sys
 import tomllib
@@ -43,3 +45,15 @@ def test_every_package_folder_is_in_the_wheel():
         packages = tomllib.load(stream)["tool"]["setuptools"]["packages"]
     folders = {p.parent for top in ("ident", "sim") for p in (ROOT / top).rglob("*.py")}
     assert sorted(packages) == sorted(".".join(f.relative_to(ROOT).parts) for f in folders)
+
+
+def test_documentation_is_generated_from_the_checkout_it_lies_in(tmp_path):
+    """An older copy of the package that is found first must not write its text into this checkout."""
+    (tmp_path / "ident").mkdir()
+    (tmp_path / "ident" / "__init__.py").write_text("raise SystemExit('the other copy')\n")
+    shutil.copytree(tmp_path / "ident", tmp_path / "sim")
+    environment = {**os.environ, "PYTHONPATH": str(tmp_path)}
+    command = [sys.executable, str(ROOT / "docs" / "generate.py"), "--help"]
+    done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "--check" in done.stdout

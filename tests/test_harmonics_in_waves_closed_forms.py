@@ -5,16 +5,20 @@ omega_e = omega - k U cos mu, the errors of amplitudes in AR(1) noise.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
+import pandas as pd
 import pytest
 from flights_in_waves import made_flight
 from scipy.signal import lfilter
 
+from ident.sea_cases import harmonics_over_depth, in_waves, regular_waves
 from ident.seakeeping import encounter_of, harmonics, harmonics_of
 from ident.seakeeping_figures import harmonics_figure
-from ident.seakeeping_published import against_published, read_published
+from sim.case import load_case
 from sim.errors import InputError
 from sim.waves import kinematics, make_waves, regular
 
@@ -186,40 +190,56 @@ def test_encounter_does_not_depend_on_where_time_begins():
     )
 
 
+CASES = ("ss5-2.5m", "ss5-23.69m")
+
+
 @pytest.mark.skipif(not REFERENCE.is_file(), reason="needs the digitised harmonics of SS5")
-def test_published_harmonics_are_those_of_the_source(tmp_path):
-    """The published model reaches 88-94 % of the depth, 83-96 % of the pitch amplitudes of CFD."""
-    reference = read_published(REFERENCE)
+@pytest.mark.parametrize("name", CASES)
+def test_published_harmonics_of_the_cases_are_those_of_the_figure(name):
+    """Values and reading errors as digitised from Kim et al. (2021), Fig. 22."""
+    case = load_case(name)[0]
+    read = pd.read_csv(REFERENCE)
+    read = read[np.isclose(read["D0_m"], case.initial.depth_m)]
+    wanted = {(r.source, r.channel, r.unit): (r.value, r.sigma) for r in read.itertuples()}
+    own = {(p.source, p.metric.removesuffix("_deg"), p.unit): (p.value, p.sigma) for p in case.published}
+    assert own == wanted
+    assert len(own) == 4
+
+
+def _flown(name, waves, time):
+    """A case as if it had moved as the CFD did."""
+    case = load_case(name)[0]
+    cfd = {p.metric: p.value for p in case.published if p.source == "CFD"}
+    theta = met(waves, time, 5.14 * time, 0.0 * time)
+    z, pitch = cfd["dz1_over_aw"] * 1.625 * np.cos(theta), math.radians(cfd["theta1_deg"]) * np.cos(theta)
+    flight = replace(made_flight(time, x=5.14 * time, z=z, theta=pitch), waves=waves)
+    return SimpleNamespace(
+        case=case, in_waves=in_waves(case, flight), result={"database": {"version": 3, "digest": "d" * 64}}
+    )
+
+
+def test_harmonics_over_depth_are_drawn_with_their_reading_errors(tmp_path, monkeypatch):
+    """One figure holds every depth of one wave; another wave, and a depth a second time, have their own."""
     waves = regular(3.25, 140.9, math.pi, RHO, G)
     time = np.arange(0.0, 600.0, 0.2)
-    theta = met(waves, time, 5.14 * time, 0.0 * time)
-    cfd = reference[reference.source == "CFD"].set_index(["channel", "D0_m"])["value"]
-    flown = {}
-    for depth in (2.5, 23.69):
-        z = cfd["dz1_over_aw", depth] * 1.625 * np.cos(theta)
-        flight = made_flight(time, x=5.14 * time, z=z, theta=math.radians(cfd["theta1", depth]) * np.cos(theta))
-        flown[depth] = harmonics(flight, waves)
-    rows = against_published(flown, reference)
-    assert len(rows) == 8
-    ratio = {(r["source"], r["channel"], r["D0_m"]): r["ratio"] for r in rows}
-    for channel, low, high in (("dz1_over_aw", 0.87, 0.95), ("theta1", 0.83, 0.96)):
-        for depth in (2.5, 23.69):
-            assert ratio["CFD", channel, depth] == pytest.approx(1.0, abs=1e-6)
-            assert low < 1.0 / ratio["HDM", channel, depth] < high
-    made = harmonics_figure(flown, reference, tmp_path / "harmonics.png", "Self-propulsion in SS5", "made")
-    assert made.stat().st_size > 10_000
+    done = [_flown(name, waves, time) for name in CASES]
+    for one in done:
+        measured = regular_waves(one.in_waves.harmonics)
+        cfd = {p.metric: p.value for p in one.case.published if p.source == "CFD"}
+        assert {k: measured[k] for k in cfd} == pytest.approx(cfd, rel=1e-6)
+    given = []
 
+    def figure(flown, reference, path, *words):
+        given.append((sorted(flown), reference, words[0]))
+        return harmonics_figure(flown, reference, path, *words)
 
-def test_published_harmonics_are_checked(tmp_path):
-    path = tmp_path / "mine.csv"
-    with pytest.raises(InputError, match="no such file"):
-        read_published(path)
-    path.write_text("source,channel,D0_m,value,unit\n")
-    with pytest.raises(InputError, match="sigma missing"):
-        read_published(path)
-    path.write_text("source,channel,D0_m,value,unit,sigma\nCFD,theta1,2.5,0.02,rad,0\n")
-    with pytest.raises(InputError, match="row 2: theta1 in rad"):
-        read_published(path)
-    path.write_text("source,channel,D0_m,value,unit,sigma\nCFD,theta1,2.5,nan,deg,0\n")
-    with pytest.raises(InputError, match="row 2, column value"):
-        read_published(path)
+    monkeypatch.setattr("ident.seakeeping_figures.harmonics_figure", figure)
+    again = _flown(CASES[0], waves, time)
+    files = harmonics_over_depth([*done, again], tmp_path)
+    assert [f.name for f in files] == ["harmonics_in_waves_v3.png", "harmonics_in_waves_2_v3.png"]
+    assert all(f.stat().st_size > 10_000 for f in files)
+    depths, reference, title = given[0]
+    assert depths == [2.5, 23.69]
+    assert set(reference["sigma"]) == {0.0004, 0.0015}
+    assert "140.9 m long, mu = 180 deg" in title
+    assert given[1][0] == [2.5]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numba import njit
 
-from ident.sea_cases import irregular_waves, regular_waves, turn_drift
+from ident.sea_cases import in_waves, irregular_waves, regular_waves, turn_drift
 from sim.case import Case, WavesData, load_case
 from sim.in_waves import shares, surroundings, water_around
 from sim.mean_loads import dipole_body, plane_waves, scattering
@@ -160,7 +160,8 @@ def test_a_turning_circle_drifts_with_the_waves(coefficients):
 def test_harmonics_in_head_seas_beside_cfd(coefficients, name, depth, pitch):
     """Depth near the surface and pitch in deep water are not within 5 % of the CFD, and this says so."""
     case = load_case(name)[0]
-    found = regular_waves(simulate(_changed(name, run={"duration_s": 400.0}), coefficients))
+    flown = _changed(name, run={"duration_s": 400.0})
+    found = regular_waves(in_waves(flown, simulate(flown, coefficients)).harmonics)
     cfd = {p.metric: p.value for p in case.published if p.source == "CFD"}
     assert depth[0] < found["dz1_over_aw"] / cfd["dz1_over_aw"] < depth[1]
     assert pitch[0] < found["theta1_deg"] / cfd["theta1_deg"] < pitch[1]
@@ -225,8 +226,15 @@ def test_a_seed_gives_the_same_sea_and_its_statistics(coefficients):
     other = simulate(_changed("periscope-depth", run={"duration_s": 900.0}, waves={"seed": 9}), coefficients)
     assert np.array_equal(first.record, again.record)
     assert not np.array_equal(first.record, other.record)
-    found, others = irregular_waves(first), irregular_waves(other)
+    found, others = (irregular_waves(in_waves(case, one).statistics, one) for one in (first, other))
     # The boat moves less than the surface, whose significant height is 1.9 m.
     assert 0.2 < found["D0_significant_m"] < 1.9
     assert others["theta_significant_deg"] == pytest.approx(found["theta_significant_deg"], rel=0.35)
     assert found["broaching_per_hour"] == 0.0
+    # Longer is nearer to the surface, and what is passed once in a hundred times nearer still.
+    least = [found[f"D0_least_{k}_m"] for k in ("3h_1percent_rice", "3h_rice", "rice")]
+    assert least == sorted(least)
+    # sqrt(2 ln n)/4 of the significant double amplitude: 0.7 for a hundred waves, 1.3 for a million.
+    below = (found["D0_mean_m"] - np.array(least)) / found["D0_significant_m"]
+    assert 0.5 < below[2] < below[1] < below[0] < 1.5
+    assert found["D0_least_m"] == first["D0"].min() < found["D0_mean_m"]

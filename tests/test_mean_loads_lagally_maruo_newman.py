@@ -13,9 +13,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from dipole_bodies import FREE, RHO, G, assembled, lamb, spheroid
+from dipole_bodies import FREE, RHO, G, assembled, kochin, lamb, spheroid
 
-from sim.mean_loads import DipoleBody, kochin, mean_loads, plane_waves, rigid_response, scattering
+from sim.mean_loads import DipoleBody, mean_loads, plane_waves, rigid_response, scattering
 from sim.pressure import Quadrature, fill_rotation, froude_krylov
 from sim.waves import make_waves
 

@@ -95,11 +95,15 @@ def test_command_line_takes_an_own_reference(tmp_path, fitted_db):
         ("source,channel,t,value,unit,sigma\nA,x,0,1,m,?\n", ["row 2", "sigma"]),
         ("source,channel,t,value,unit\nA,x,900,1,m\n", ["begins", "900"]),
         ("", ["not a table"]),
+        ("source,channel,t,value,unit\nA,x,0,1,m\n,x,1,2,m\n", ["row 3", "column source", "nothing"]),
+        ("source,channel,t,value,unit\nA,x,-2,1,m\nA,x,1,2,m\n", ["row 2", "column t", "-2", "zero or more"]),
+        ("source,channel,t,value,unit,sigma\nA,x,0,1,m,-1\n", ["row 2", "column sigma", "-1", "zero or more"]),
+        ("\xff\xfe", ["not a table"]),
     ],
 )
 def test_mistake_in_an_own_reference_is_named(tmp_path, fitted_db, text, words):
     path = tmp_path / "mine.csv"
-    path.write_text(text)
+    path.write_text(text, encoding="latin-1")
     with pytest.raises(InputError) as caught:
         validate("vzz10-15kt", fitted_db, reference_file=path)
     for word in words:

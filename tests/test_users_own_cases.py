@@ -9,6 +9,7 @@ import pytest
 from ident.validate import validate
 from sim.case import load_case
 from sim.errors import InputError
+from sim.vehicle import load_vehicle
 
 TEXT = (files("sim") / "cases" / "roll-decay.toml").read_text("utf-8")
 SERIES = (files("sim") / "cases" / "data" / "roll_decay.csv").read_text("utf-8")
@@ -59,6 +60,10 @@ def test_reference_in_degrees_gives_the_same_error_in_degrees(write, fitted_db):
         ('vehicle = "bb2"', 'vehicle = "bb3"', ["bb3", "bb2"]),
         ("speed_mps = 0.0\n", "", ["initial.speed_mps", "nothing"]),
         ("data/roll_decay.csv", "data/none.csv", ["none.csv", "missing"]),
+        ("duration_s = 120.0", "duratoin_s = 120.0", ["run.duratoin_s", "unknown key", "duration_s?"]),
+        ("record_s = 0.1", "record_s = 0.1\ncolour = 3", ["run.colour", "unknown key", "step_s, record_s"]),
+        ("record_s = 0.1", "record_s = 130.0", ["key run", "record_s = 130.0", "longer than duration_s"]),
+        ("record_s = 0.1", 'record_s = 0.1\nstop = [{channel = "psi", above = -1.0}]', ["ends at 0.000 s", "later"]),
     ],
 )
 def test_mistake_in_a_case_is_named(write, fitted_db, old, new, words):
@@ -75,6 +80,7 @@ def test_mistake_in_a_case_is_named(write, fitted_db, old, new, words):
         ("rad", "furlong", ["furlong", "rad"]),
         ("value", "valu", ["column value missing"]),
         ("-0.076853", "nan", ["row", "column value", "nan"]),
+        ("EXP,phi,", ",phi,", ["row 2", "column source", "nothing"]),
     ],
 )
 def test_mistake_in_a_reference_is_named(write, fitted_db, old, new, words):
@@ -92,3 +98,38 @@ def test_a_number_no_file_means_is_refused_with_its_key(tmp_path, number):
     path.write_text(text.replace("depth_m = 25.0", f"depth_m = {number}"), encoding="utf-8")
     with pytest.raises(InputError, match=r"initial\.depth_m"):
         load_case(str(path))
+
+
+@pytest.mark.parametrize("name", ["turning-circle", "hzz20", "self-propulsion"])
+def test_a_start_above_the_surface_is_refused_but_for_a_boat_that_may_be_there(tmp_path, name):
+    text = (files("sim") / "cases" / f"{name}.toml").read_text("utf-8")
+    line = next(k for k in text.splitlines() if k.startswith("depth_m = "))
+    path = tmp_path / "own.toml"
+    path.write_text(text.replace(line, "depth_m = -3.0", 1))
+    with pytest.raises(InputError, match=r"depth_m -3 .*positive down"):
+        load_case(path)
+    path.write_text(path.read_text().replace("gravity_mps2 = 9.81", "gravity_mps2 = 9.81\nfree_surface = true"))
+    assert load_case(path)[0].initial.depth_m == -3.0
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ('value = 70.2, unit = "m"', 'value = 70.2, unit = "ft"', ["particulars.length", "'ft'", "unit 'm'"]),
+        ("length = { value = 70.2", "length = { value = -70.2", ["particulars.length", "above zero"]),
+        ("mass = { value = ", "mass = { value = -", ["particulars.mass", "above zero"]),
+        ('unit = "rps"', 'unit = "rpm"', ["propeller.limits", "'rpm'", "unit 'rps'"]),
+        ("mixer = { dV = -1, dH = -1 }", "mixer = { dV = -1 }", ["planes.0.mixer.dH", "nothing"]),
+        ('mirror = "stern_plane_4"', 'mirror = "stern_plane_9"', ["planes", "stern_plane_9", "not a plane"]),
+    ],
+)
+def test_mistake_in_a_vehicle_is_named(tmp_path, old, new, words):
+    """Numbers are used as they are, so that a unit that is not the program's must not pass."""
+    text = (files("sim") / "vehicles" / "bb2.toml").read_text("utf-8")
+    assert old in text
+    path = tmp_path / "own.toml"
+    path.write_text(text.replace(old, new, 1))
+    with pytest.raises(InputError) as caught:
+        load_vehicle(path)
+    for word in words:
+        assert word in str(caught.value)

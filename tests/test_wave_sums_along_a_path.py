@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from sim import wave_loads
+from sim import wave_loads, wave_passage
 from sim.in_waves import probes, section_masses, volume_points, water_around
 from sim.model import Environment, added_mass_matrix
 from sim.pressure import froude_krylov, rotation
@@ -144,8 +144,8 @@ def test_interpolated_loads_follow_the_exact_ones(boat, seaway):
         sums, out = wave_loads.passage(sea), np.zeros(len(size))
         miss = np.zeros(len(size))
         for t, y, known in zip(times, path, exact, strict=True):
-            wave_loads.advance(sea, y, t, sums)
-            wave_loads.interpolate(sums.time, sums.value, sums.slope, t, out)
+            wave_passage.advance(sea, y, t, sums)
+            wave_passage.interpolate(sums.time, sums.value, sums.slope, t, out)
             miss = np.maximum(miss, np.abs(out - known) / size)
         worst.append(miss.max())
     assert worst[0] < 5e-3
@@ -156,10 +156,10 @@ def test_sums_are_made_anew_after_a_jump(boat, seaway):
     """A boat put elsewhere, or a time gone back, is noticed: the next value is exact."""
     sea = wave_loads.make_sea(seaway, *boat)
     sums, out = wave_loads.passage(sea), np.zeros(18 + 18 + 1)
-    wave_loads.advance(sea, _state(), 0.0, sums)
+    wave_passage.advance(sea, _state(), 0.0, sums)
     for y, time in ((_state(x=140.0), 0.4), (_state(psi=1.5), 0.8), (_state(), 0.1)):
-        wave_loads.advance(sea, y, time, sums)
-        wave_loads.interpolate(sums.time, sums.value, sums.slope, time, out)
+        wave_passage.advance(sea, y, time, sums)
+        wave_passage.interpolate(sums.time, sums.value, sums.slope, time, out)
         value, slope = _evaluate(sea, y, time)
         assert out[:6] == pytest.approx(value[:6], rel=1e-9)
         assert out[6:12] == pytest.approx(slope[12:18], rel=1e-9)
@@ -169,9 +169,9 @@ def test_sums_are_made_anew_after_a_jump(boat, seaway):
 def test_within_a_span_nothing_is_summed_again(boat, seaway):
     sea = wave_loads.make_sea(seaway, *boat)
     sums = wave_loads.passage(sea)
-    wave_loads.advance(sea, _state(), 0.0, sums)
+    wave_passage.advance(sea, _state(), 0.0, sums)
     kept = sums.value.copy()
-    wave_loads.advance(sea, _state(x=100.1), 0.2, sums)
+    wave_passage.advance(sea, _state(x=100.1), 0.2, sums)
     assert np.array_equal(sums.value, kept)
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from ident.commands.shared import DB, VERSION, console_for, emit, equilibrium_of
+from ident.commands.shared import DB, VERSION, console_for, emit, equilibrium_of, json_to, out_file
 
 
 @click.command()
@@ -14,12 +14,12 @@ from ident.commands.shared import DB, VERSION, console_for, emit, equilibrium_of
 @DB
 @VERSION
 @click.option("--vehicle", default=None, help="Bundled vehicle or path to a vehicle file, instead of the case's.")
-@click.option("--out", type=click.Path(path_type=Path), default=None, help="File to write, .gif or .mp4; CASE.gif.")
+@out_file("File to write, .gif or .mp4; CASE.gif.")
 @click.option("--frames", type=click.IntRange(2, 2000), default=200, show_default=True, help="Number of pictures.")
 @click.option("--fps", type=click.FloatRange(1, 50), default=20.0, show_default=True, help="Pictures a second.")
 @click.option("--start", type=float, default=None, help="Time to begin at [s].")
 @click.option("--end", type=float, default=None, help="Time to end at [s].")
-@click.option("--json", "json_path", default=None, metavar="PATH|-", help="Write what was drawn as JSON.")
+@json_to("Write what was drawn as JSON.")
 def animate(
     case: str,
     db: str,

@@ -8,14 +8,14 @@ from typing import Any
 
 import click
 
-from ident.commands.shared import DB, OUT, console_for, emit
+from ident.commands.shared import DB, OUT, console_for, emit, json_to, out_file
 
 
 @click.command()
 @click.argument("folder", type=click.Path(path_type=Path))
 @DB
 @click.option("-m", "--message", default="", help="Message stored with the version.")
-@click.option("--json", "json_path", default=None, metavar="PATH|-", help="Write the summary as JSON.")
+@json_to("Write the summary as JSON.")
 @click.option("--strict", is_flag=True, help="Commit nothing when a quality check finds an error.")
 def fit(folder: Path, db: str, message: str, json_path: str | None, strict: bool) -> None:
     """Identify the coefficients of a campaign and commit one database version.
@@ -39,7 +39,7 @@ def fit(folder: Path, db: str, message: str, json_path: str | None, strict: bool
 
 @click.command()
 @click.argument("folder", type=click.Path(path_type=Path))
-@click.option("--json", "json_path", default=None, metavar="PATH|-", help="Write the findings as JSON.")
+@json_to("Write the findings as JSON.")
 @click.option("--strict", is_flag=True, help="Exit 1 when a finding is an error.")
 def check(folder: Path, json_path: str | None, strict: bool) -> None:
     """Check the runs of a campaign: copies, slips, outliers, levers, inertia, missing tests.
@@ -68,8 +68,8 @@ def check(folder: Path, json_path: str | None, strict: bool) -> None:
 @click.argument("folder", type=click.Path(path_type=Path))
 @click.option("--target-rel", default=0.1, show_default=True, help="Standard error wanted, relative to a term's size.")
 @click.option("--facility", type=click.Path(path_type=Path), default=None, help="TOML file of levels and limits.")
-@click.option("--out", type=click.Path(path_type=Path), default=None, help="Write the test matrix as CSV.")
-@click.option("--json", "json_path", default=None, metavar="PATH|-", help="Write terms and runs as JSON.")
+@out_file("Write the test matrix as CSV.")
+@json_to("Write terms and runs as JSON.")
 def plan(folder: Path, target_rel: float, facility: Path | None, out: Path | None, json_path: str | None) -> None:
     """Plan the fewest runs that give every term of the vehicle a wanted standard error.
 
@@ -101,7 +101,7 @@ def plan(folder: Path, target_rel: float, facility: Path | None, out: Path | Non
 @click.command()
 @click.argument("folder", type=click.Path(path_type=Path))
 @OUT
-@click.option("--json", "json_path", default=None, metavar="PATH|-", help="Write the run table as JSON.")
+@json_to("Write the run table as JSON.")
 def runs(folder: Path, out: Path, json_path: str | None) -> None:
     """Read a campaign and show its run table; plot the time histories it reduced.
 

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Any
 
 import click
 
-from ident.commands.shared import DB, OUT, VERSION, console_for, emit, equilibrium_of
+from ident.commands.shared import DB, OUT, VERSION, console_for, emit, equilibrium_of, json_to
 
 
 @click.command()
@@ -19,7 +20,7 @@ from ident.commands.shared import DB, OUT, VERSION, console_for, emit, equilibri
 @DB
 @VERSION
 @OUT
-@click.option("--json", "json_path", default=None, metavar="PATH|-", help="Write the comparison as JSON.")
+@json_to("Write the comparison as JSON.")
 @click.option("--strict", is_flag=True, help="Exit 1 when a tolerance of a case file is missed.")
 @click.option("--samples", type=click.IntRange(min=2), default=None, help="Draw so many coefficient sets; error bands.")
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Seed of the draws.")
@@ -61,18 +62,16 @@ def validate(
              ident validate --case turning-circle --vehicle my_boat.toml
              ident validate --all
     """
-    from sim.errors import InputError
-
     if (case is None) == (not every):
         raise click.UsageError("give either --case NAME or --all")
     if every and (samples or any(own.values())):
         raise click.UsageError("--samples, --vehicle, --reference and --frame go with --case")
+    if cases and not every:
+        raise click.UsageError("--cases goes with --all")
     if dask and not samples:
         raise click.UsageError("--dask goes with --samples")
     if own["frame"] and not own["reference"]:
         raise click.UsageError("--frame goes with --reference")
-    if out.exists() and not out.is_dir():
-        raise InputError(str(out), "a file", "a folder for the figures")
     console = console_for(quiet=json_path == "-")
     with equilibrium_of(case or "of --all"):
         done, result = _one(case, db, version, own, console) if case else _all(db, version, cases, console)
@@ -96,9 +95,7 @@ def _sea_figures(done: list[Any], out: Path) -> list[Path]:
         return []
     from ident.sea_cases import harmonics_over_depth, sea_figures
 
-    found = [figure for one in done for figure in sea_figures(one, out)]
-    over_depth = harmonics_over_depth(done, out)
-    return [*found, over_depth] if over_depth else found
+    return [figure for one in done for figure in sea_figures(one, out)] + harmonics_over_depth(done, out)
 
 
 def _one(
@@ -146,7 +143,7 @@ def _all(db: str, version: int | None, cases: Path | None, console: Any) -> tupl
 @VERSION
 @click.option("-m", "--message", default="", help="Message stored with the version.")
 @click.option("--left-out/--no-left-out", default=True, show_default=True, help="Repeat without each source in turn.")
-@click.option("--json", "json_path", default=None, metavar="PATH|-", help="Write priors, posteriors and diagnostics.")
+@json_to("Write priors, posteriors and diagnostics.")
 def calibrate(name: str, db: str, version: int | None, message: str, left_out: bool, json_path: str | None) -> None:
     """Estimate multipliers of coefficient groups from free-running maneuvers.
 
@@ -172,8 +169,8 @@ def calibrate(name: str, db: str, version: int | None, message: str, left_out: b
 @VERSION
 @click.option("--case", "case", default="hzz20", show_default=True, help="Case that gives vehicle and environment.")
 @click.option("--speed", "speeds", type=click.FloatRange(min=0, min_open=True), multiple=True, help="U [m/s]; repeat.")
-@click.option("--depth", "depths", type=float, multiple=True, help="D0 [m]; repeat.")
-@click.option("--json", "json_path", default=None, metavar="PATH|-", help="Write the results as JSON.")
+@click.option("--depth", "depths", type=click.FloatRange(min=0), multiple=True, help="D0 [m]; repeat.")
+@json_to("Write the results as JSON.")
 def stability(
     db: str,
     version: int | None,
@@ -201,6 +198,9 @@ def stability(
     vehicle = load_vehicle(data.vehicle, beside=where)
     rows, number = read_rows(db, version, vehicle.name)
     drift = rows[rows["output"].eq("N") & rows["beta_deg"].notna()]
+    for name, values in (("speed", speeds), ("depth", depths)):
+        if any(not math.isfinite(v) for v in values):
+            raise click.UsageError(f"--{name} is a finite number")
     speeds = speeds or tuple(sorted(drift["speed_mps"].dropna().unique())) or (data.initial.speed_mps,)
     depths = depths or tuple(sorted(drift["depth_m"].dropna().unique())) or (data.initial.depth_m,)
     environment = Environment(data.environment.density_kgpm3, data.environment.gravity_mps2)

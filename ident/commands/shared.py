@@ -13,9 +13,43 @@ import click
 
 DB = click.option("--db", default="coeff_db", show_default=True, help="Database folder or object-store URL.")
 VERSION = click.option("--version", "version", type=int, default=None, help="Database version; latest by default.")
+
+
+def _folder(context: click.Context, parameter: click.Parameter, value: Path) -> Path:
+    from ident.output import check_folder
+
+    check_folder(value)
+    return value
+
+
+def _file(context: click.Context, parameter: click.Parameter, value: Any) -> Any:
+    from ident.output import check_file
+
+    if value not in (None, "-"):
+        check_file(Path(value))
+    return value
+
+
+# Where a command writes is looked at before it works: a calibration of minutes must not end at a wrong path.
 OUT = click.option(
-    "--out", type=click.Path(path_type=Path), default=Path("reports"), show_default=True, help="Folder to write to."
+    "--out",
+    type=click.Path(path_type=Path),
+    default=Path("reports"),
+    show_default=True,
+    callback=_folder,
+    help="Folder to write to.",
 )
+FOLDER = click.argument("folder", type=click.Path(path_type=Path), callback=_folder)
+
+
+def out_file(text: str) -> Any:
+    """The option ``--out`` of a command that writes one file."""
+    return click.option("--out", type=click.Path(path_type=Path), default=None, callback=_file, help=text)
+
+
+def json_to(text: str) -> Any:
+    """The option ``--json`` of a command, with its help."""
+    return click.option("--json", "json_path", default=None, metavar="PATH|-", callback=_file, help=text)
 
 
 def emit(data: Any, target: str) -> None:
@@ -30,14 +64,10 @@ def emit(data: Any, target: str) -> None:
     if target == "-":
         click.echo(text)
         return
-    path = Path(target)
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(text + "\n", encoding="utf-8")
-    except OSError as error:
-        from sim.errors import InputError
+    from ident.output import whole
 
-        raise InputError(target, f"cannot be written: {error.strerror}", "a path you may write to, or -") from error
+    with whole(Path(target)) as part:
+        part.write_text(text + "\n", encoding="utf-8")
 
 
 @contextmanager

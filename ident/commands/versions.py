@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from ident.commands.shared import DB, OUT, VERSION, console_for, emit
+from ident.commands.shared import DB, FOLDER, OUT, VERSION, console_for, emit, json_to
 
 
 @click.command()
@@ -14,7 +14,7 @@ from ident.commands.shared import DB, OUT, VERSION, console_for, emit
 @VERSION
 @click.option("--vehicle", default="bb2", show_default=True, help="Bundled vehicle name, or path to a vehicle file.")
 @OUT
-@click.option("--json", "json_path", default=None, metavar="PATH|-", help="Write what the page shows as JSON.")
+@json_to("Write what the page shows as JSON.")
 def report(db: str, version: int | None, vehicle: str, out: Path, json_path: str | None) -> None:
     """Write one self-contained HTML page on a database version.
 
@@ -33,7 +33,7 @@ def report(db: str, version: int | None, vehicle: str, out: Path, json_path: str
 
 @click.command()
 @DB
-@click.option("--json", "json_path", default=None, metavar="PATH|-", help="Write the list as JSON.")
+@json_to("Write the list as JSON.")
 def versions(db: str, json_path: str | None) -> None:
     """List the versions of a database.
 
@@ -68,7 +68,7 @@ def versions(db: str, json_path: str | None) -> None:
 @click.argument("first", type=int)
 @click.argument("second", type=int)
 @DB
-@click.option("--json", "json_path", default=None, metavar="PATH|-", help="Write the differences as JSON.")
+@json_to("Write the differences as JSON.")
 def diff(first: int, second: int, db: str, json_path: str | None) -> None:
     """Show what changed between two versions.
 
@@ -96,11 +96,11 @@ def diff(first: int, second: int, db: str, json_path: str | None) -> None:
 
 
 @click.command()
-@click.argument("folder", type=click.Path(path_type=Path))
+@FOLDER
 @click.option("--format", "kind", type=click.Choice(["parquet", "csv", "json"]), default="csv", show_default=True)
 @DB
 @VERSION
-@click.option("--json", "json_path", default=None, metavar="PATH|-", help="Write what was exported as JSON.")
+@json_to("Write what was exported as JSON.")
 def export(folder: Path, kind: str, db: str, version: int | None, json_path: str | None) -> None:
     """Write one version as a plain file into FOLDER.
 

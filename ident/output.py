@@ -1,0 +1,56 @@
+"""Files that a command writes: checked before the work begins, and then written whole or not at all."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from collections.abc import Iterator
+from pathlib import Path
+
+
+def check_folder(path: Path) -> None:
+    """Refuse a folder that cannot be written to or made. Raises ``InputError``."""
+    from sim.errors import InputError
+
+    if path.exists() and not path.is_dir():
+        raise InputError(str(path), "a file", "a folder to write to")
+    above = next(p for p in (path, *path.absolute().parents) if p.exists())
+    if not above.is_dir():
+        raise InputError(str(path), f"{above} is a file", "a folder to write to")
+    if not os.access(above, os.W_OK | os.X_OK):
+        raise InputError(str(path), f"{above} may not be written to", "a folder you may write to")
+
+
+def check_file(path: Path) -> None:
+    """Refuse a file that cannot be written. Raises ``InputError``."""
+    from sim.errors import InputError
+
+    if path.is_dir():
+        raise InputError(str(path), "a folder", "a file to write")
+    check_folder(path.parent)
+    if path.exists() and not os.access(path, os.W_OK):
+        raise InputError(str(path), "a file that may not be written to", "a file you may write to")
+
+
+@contextlib.contextmanager
+def whole(path: Path) -> Iterator[Path]:
+    """A file beside ``path``, of the same suffix, that takes its place once it is written.
+
+    Raises
+    ------
+    sim.errors.InputError
+        When it cannot be written; nothing is left then.
+    """
+    from sim.errors import InputError
+
+    part = path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        yield part
+        part.replace(path)
+    except OSError as error:
+        text = f"cannot be written: {error.strerror or error}"
+        raise InputError(str(path), text, "a path you may write to") from error
+    finally:
+        with contextlib.suppress(OSError):
+            part.unlink()
