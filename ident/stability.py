@@ -27,8 +27,29 @@ _VERTICAL = (0, 2, 4, 8, 10)
 _HORIZONTAL = (1, 3, 5, 9)
 # Accelerations whose added mass a plane of motion cannot do without: w, q and v, r.
 _VERTICAL_INERTIA, _HORIZONTAL_INERTIA = (2, 4), (1, 5)
+_PLANES = ("vertical", "horizontal")
+_STATES = (*"uvwpqrxyz", "phi", "theta", "psi")
 _TABLE_STEP = 1e-4
 _DEFLECTION = math.radians(1.0)
+
+
+@dataclass(frozen=True)
+class Linear:
+    """x' = A x + b c of small changes x from a steady state, and c from the command that holds it.
+
+    Attributes
+    ----------
+    states : Names of x; m/s, rad/s, m and rad, x forward, y starboard, z down.
+    command : dV or dH [rad], through the mixer; without the delay of the actuators.
+    a, b : (n, n) and (n,).
+    about : (n,) values of the states that x are the changes from.
+    """
+
+    states: tuple[str, ...]
+    command: str
+    a: list[list[float]]
+    b: list[float]
+    about: list[float]
 
 
 @dataclass(frozen=True)
@@ -47,6 +68,7 @@ class Stability:
     vertical, horizontal : Eigenvalues [1/s] of the motion about ``about``, real and imaginary
         part, least stable first; empty when there is no such state, or no added mass of
         that plane of motion.
+    linear : The linear models these are of, vertical and horizontal, as far as there are any.
     about : ``self-propulsion``, or ``speed held``: straight and level with the planes at
         zero and without surge, for a vehicle without propulsion data.
     """
@@ -61,6 +83,7 @@ class Stability:
     critical_speed_sail: float | None
     vertical: list[tuple[float, float]]
     horizontal: list[tuple[float, float]]
+    linear: dict[str, Linear]
     about: str
 
 
@@ -114,27 +137,39 @@ def _plane_slope(model: kernel.Model, vehicle: Vehicle, names: list[str], speed:
     return (up - down) / (2.0 * _DEFLECTION)
 
 
-def _eigenvalues(
-    model: kernel.Model, state: Array, controls: Array, kept: tuple[int, ...], step: float
-) -> list[tuple[float, float]]:
+def _linear(
+    model: kernel.Model, vehicle: Vehicle, state: Array, controls: Array, kept: tuple[int, ...], step: float
+) -> Linear:
+    """Central differences of the right-hand side; ``step`` in a state, a degree in the command."""
     work = kernel.workspace(controls.size - 1)
-    jacobian = np.zeros((12, 12))
-    for j in kept:
+
+    def change(to_state: Array, to_controls: Array) -> Array:
         side = []
         for sign in (1.0, -1.0):
-            moved, rate = state.copy(), np.zeros(12)
-            moved[j] += sign * step
-            kernel.rhs(model, moved, controls, work, rate)
+            rate = np.zeros(12)
+            kernel.rhs(model, state + sign * to_state, controls + sign * to_controls, work, rate)
             side.append(rate)
-        jacobian[:, j] = (side[0] - side[1]) / (2.0 * step)
-    values = np.linalg.eigvals(jacobian[np.ix_(kept, kept)])
+        return np.asarray(side[0] - side[1])[list(kept)] / 2.0
+
+    axis = "dV" if 2 in kept else "dH"
+    shares = np.array([getattr(p.mixer, axis) for p in vehicle.planes] + [0.0])
+    none = np.zeros_like(controls)
+    a = np.column_stack([change(step * np.eye(12)[j], none) / step for j in kept])
+    b = change(np.zeros(12), _DEFLECTION * shares) / _DEFLECTION
+    about = [float(state[j]) for j in kept]
+    return Linear(tuple(_STATES[j] for j in kept), axis, a.tolist(), b.tolist(), about)
+
+
+def _eigenvalues(linear: Linear) -> list[tuple[float, float]]:
+    """Least stable first."""
+    values = np.linalg.eigvals(np.array(linear.a))
     return [(float(v.real), float(v.imag)) for v in sorted(values, key=lambda v: (-v.real, v.imag))]
 
 
-def _roots(
+def _linear_models(
     coefficients: Coefficients, environment: Environment, model: kernel.Model, speed: float, depth: float
-) -> tuple[list[list[tuple[float, float]]], str]:
-    """Vertical and horizontal eigenvalues [1/s], and the state they are about."""
+) -> tuple[dict[str, Linear], str]:
+    """Linear models, vertical and horizontal, as far as there are any; the state they are about."""
     vehicle = coefficients.vehicle
     step = _TABLE_STEP if vehicle.term_set == "reduced" else min(steps(vehicle))
     kept, about = [_VERTICAL, _HORIZONTAL], "self-propulsion"
@@ -146,13 +181,13 @@ def _roots(
         try:
             trim = self_propulsion(model, mixer_of(vehicle), speed, depth, plane_limits(vehicle)[0])
         except NoEquilibrium:
-            return [[], []], about
+            return {}, about
         state, controls = trim.state, trim.controls
     added = np.diag(added_mass_matrix(coefficients, environment))
-    found = []
-    for inertia, states in zip((_VERTICAL_INERTIA, _HORIZONTAL_INERTIA), kept, strict=True):
-        complete = bool((added[list(inertia)] > 0.0).all())
-        found.append(_eigenvalues(model, state, controls, states, step) if complete else [])
+    found = {}
+    for name, inertia, states in zip(_PLANES, (_VERTICAL_INERTIA, _HORIZONTAL_INERTIA), kept, strict=True):
+        if (added[list(inertia)] > 0.0).all():
+            found[name] = _linear(model, vehicle, state, controls, states, step)
     return found, about
 
 
@@ -199,7 +234,8 @@ def stability(coefficients: Coefficients, environment: Environment, speed: float
         force = prime(f"{output[0]}_{by}")
         return sign * prime(f"{output[1]}_{by}") / force if force else None
 
-    values, about = _roots(coefficients, environment, model, speed, depth)
+    linear, about = _linear_models(coefficients, environment, model, speed, depth)
+    values = {name: _eigenvalues(one) for name, one in linear.items()}
     return Stability(
         speed=speed,
         depth=depth,
@@ -209,14 +245,15 @@ def stability(coefficients: Coefficients, environment: Environment, speed: float
         neutral_point_horizontal=neutral_point("YN", "v", 1.0),
         critical_speed_stern=reversal["stern"],
         critical_speed_sail=reversal["sail"],
-        vertical=values[0],
-        horizontal=values[1],
+        vertical=values.get("vertical", []),
+        horizontal=values.get("horizontal", []),
+        linear=linear,
         about=about,
     )
 
 
 def as_json(found: list[Stability]) -> list[dict[str, Any]]:
-    """The results as plain data; eigenvalues as [real, imaginary]."""
+    """The results as plain data; eigenvalues as [real, imaginary], linear models as states, command, a, b, about."""
     return [asdict(s) for s in found]
 
 

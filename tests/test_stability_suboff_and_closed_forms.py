@@ -8,9 +8,12 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.linalg import expm
 
 from ident.stability import critical_speed, stability, stability_index
+from sim.case import load_case
 from sim.model import assemble
+from sim.plant import Plant
 from sim.simulate import mixer_of, plane_limits
 from sim.trim import self_propulsion
 
@@ -107,3 +110,24 @@ def test_least_stable_lateral_root_is_seen_in_a_flight(coefficients, environment
     late = (t > 200.0) & (t < 280.0)
     rate = np.polyfit(t[late], np.log(np.abs(v[late])), 1)[0]
     assert math.isclose(rate, found.horizontal[0][0], rel_tol=0.02)
+
+
+@pytest.mark.parametrize(("plane", "command"), [("vertical", "dV"), ("horizontal", "dH")])
+def test_linear_model_moves_as_the_boat_does_by_a_small_command(coefficients, environment, plane, command):
+    """x(t) = A^-1 (exp(A t) - 1) b c for a step; half a degree is small, and reached within a tenth of a second."""
+    case = load_case("turning-circle")[0]
+    boat = Plant(case, coefficients)
+    speed, depth = case.initial.speed_mps, case.initial.depth_m
+    linear = stability(coefficients, environment, speed, depth).linear[plane]
+    assert linear.command == command
+    assert linear.about == pytest.approx([boat[name] for name in linear.states], abs=1e-9)
+    size, time = math.radians(0.5), 12.0
+    a, b = np.array(linear.a), np.array(linear.b)
+    # Written as one exponential, which a neutral depth does not trouble.
+    whole = expm(time * np.block([[a, b[:, None]], [np.zeros((1, len(b) + 1))]]))
+    expected = whole[:-1, -1] * size
+    boat.step(round(time / boat.dt), **{command: boat.commands[command] + size})
+    moved = np.array([boat[name] for name in linear.states]) - linear.about
+    for k, name in enumerate(linear.states):
+        if name in "wqvr" or name in ("z", "theta"):
+            assert moved[k] == pytest.approx(expected[k], rel=0.06), name
