@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ident.figures import FRAME, readable
+from ident.output import whole
 from ident.silhouette import Silhouette, from_above, from_the_side, silhouette
 from sim.errors import InputError
 from sim.simulate import Simulation
@@ -359,25 +360,14 @@ def animate(
     scene = _Scene(sampled(simulation, frames, start, end), simulation, silhouette(vehicle), waves)
     planes = [p.name for p in vehicle.planes if p.name in simulation.columns]
     pictures = _pictures(scene, _figure(scene, planes, title, fps))
-    part = path.with_name(f".{path.stem}.part{path.suffix}")
     # The film's figure holds each picture as an image: drawing all axes anew takes ten times as long.
     film = Figure(figsize=_SIZE, dpi=_DPI)
     FigureCanvasAgg(film)
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with writer.saving(film, str(part), _DPI):
-            for picture in pictures:
-                film.images.clear()
-                film.figimage(picture)
-                writer.grab_frame()
-                if each is not None:
-                    each()
-        part.replace(path)
-    except OSError as error:
-        raise InputError(
-            str(path), f"cannot be written: {error.strerror or error}", "a path you may write to"
-        ) from error
-    finally:
-        if part.exists():
-            part.unlink()
+    with whole(path) as part, writer.saving(film, str(part), _DPI):
+        for picture in pictures:
+            film.images.clear()
+            film.figimage(picture)
+            writer.grab_frame()
+            if each is not None:
+                each()
     return path

@@ -17,7 +17,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pandas as pd
@@ -30,7 +30,7 @@ from sim.case import Case, Series, load_case, load_reference
 from sim.coefficients import Coefficients
 from sim.errors import InputError
 from sim.in_waves import Water
-from sim.model import Assembly
+from sim.model import Assembly, Environment
 from sim.simulate import Simulation, environment_of, equipped, fly, water_of
 from sim.trim import NoEquilibrium
 from sim.vehicle import Vehicle
@@ -102,7 +102,8 @@ class Problem:
     chosen : Groups with priors.
     cases : Case name -> (case, abscissa).
     channels : Training series.
-    prepared : Case name -> assembly and water, made when a case is first flown.
+    assemblies, waters : What flights have in common whatever the multipliers, by environment and
+        by case name; made when first flown.
     """
 
     vehicle: Vehicle
@@ -110,13 +111,14 @@ class Problem:
     chosen: list[Parameter]
     cases: dict[str, tuple[Case, str]]
     channels: list[Channel]
-    prepared: dict[str, tuple[Assembly, Water | None]] = field(default_factory=dict)
+    assemblies: dict[Environment, Assembly] = field(default_factory=dict)
+    waters: dict[str, Water | None] = field(default_factory=dict)
 
     def without(self, dropped: Callable[[Channel], bool]) -> Problem:
         """The same problem with some of the series left out."""
         kept = [c for c in self.channels if not dropped(c)]
         cases = {name: pair for name, pair in self.cases.items() if any(c.key[0] == name for c in kept)}
-        return Problem(self.vehicle, self.rows, self.chosen, cases, kept, self.prepared)
+        return replace(self, cases=cases, channels=kept)
 
     def residuals(self, theta: Array) -> list[Array]:
         """Residuals of every series at multipliers ``theta``, in the references' units."""
@@ -139,11 +141,14 @@ class Problem:
         return found
 
     def _prepared(self, case: Case) -> tuple[Assembly, Water | None]:
-        """What the flights of a case have in common whatever the multipliers."""
-        if case.name not in self.prepared:
+        """What the flights of a case have in common; cases in the same water share the assembly."""
+        environment = environment_of(case)
+        if case.name not in self.waters:
             own = Coefficients(self.vehicle, self.rows)
-            self.prepared[case.name] = Assembly(own, environment_of(case)), water_of(case, own)
-        return self.prepared[case.name]
+            if environment not in self.assemblies:
+                self.assemblies[environment] = Assembly(own, environment)
+            self.waters[case.name] = water_of(case, own)
+        return self.assemblies[environment], self.waters[case.name]
 
 
 @dataclass(frozen=True)

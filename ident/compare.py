@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ident.output import check_folder, whole
-from sim.database import axis_columns, find_version, own_version, read_rows
+from sim.database import axis_columns, last_own, read_rows, versions
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -90,11 +90,13 @@ def export(db: str, version: int | None, kind: str, folder: Path) -> dict[str, A
             rows.to_csv(part, index=False)
         else:
             rows.to_json(part, orient="records", indent=1, double_precision=15)
-    own = {name: own_version(db, name, number) for name in rows["vehicle"].unique()}
+    history = versions(db)
+    commit = next(v for v in history if v.number == number)
+    own = {name: last_own(history, name, number) or commit for name in rows["vehicle"].unique()}
     return {
         "file": str(path),
         "format": kind,
-        "database": {"path": db, "version": number, "digest": find_version(db, number).digest},
+        "database": {"path": db, "version": number, "digest": commit.digest},
         "rows": len(rows),
         "vehicles": [
             {"vehicle": name, "version": v.number, "digest": v.digest, "rows": int(rows["vehicle"].eq(name).sum())}

@@ -209,12 +209,10 @@ def _coarser(x: Array, residual: Array, weight: Array) -> tuple[Array, Array, Ar
 
 def _covariance(x: Array, residual: Array, weight: Array) -> tuple[Array, float]:
     """Covariance of least-squares coefficients with autocorrelated errors; effective samples."""
-    level = (x, residual, weight)
-    levels = [level]
-    while (coarse := _coarser(*level)) is not None:
-        level = coarse
-        levels.append(level)
-    found = [_covariance_at(*level) for level in levels[-2:]]
+    levels = [(x, residual, weight)]
+    while (coarse := _coarser(*levels[-1])) is not None:
+        levels = [levels[-1], coarse]
+    found = [_covariance_at(*level) for level in levels]
     covariance, of_mean = max(found, key=lambda f: float(np.trace(x.T @ (weight[:, None] * x) @ f[0])))
     w = weight / weight.mean()
     scatter = float((w * residual**2).sum()) / (len(w) - x.shape[1])

@@ -225,12 +225,7 @@ def _severities(findings: list[dict[str, Any]] | None) -> dict[str, int] | None:
     return {s: sum(f.get("severity") == s for f in findings) for s in reversed(SEVERITIES)}
 
 
-def write_report(db: str, version: int | None, out: Path, vehicle: str = "bb2") -> Path:
-    """``make_report``, for its file alone."""
-    return Path(make_report(db, version, out, vehicle)["file"])
-
-
-def make_report(db: str, version: int | None, out: Path, vehicle: str = "bb2") -> dict[str, Any]:
+def write_report(db: str, version: int | None, out: Path, vehicle: str = "bb2") -> dict[str, Any]:
     """Write the report of one vehicle at one database version.
 
     Parameters

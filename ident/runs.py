@@ -300,17 +300,17 @@ def _channels(
     if not wanted:
         raise InputError(sheet.where, "no column that is a quantity", "time and loads")
     names = [k.quantity for _, k in wanted]
-    primed = {k.quantity for _, k in wanted if k.primed}
-    one = pd.DataFrame([{**dict.fromkeys(names, 1.0), "U": numbers.get("U"), "file": path.name, "row": 1}])
-    scales = dimensional(one, primed, source.normalisation, header, where).iloc[0]
-    factors = [float(scales[k.quantity]) if k.primed else k.factor for _, k in wanted]
     taken = taken_columns(sheet, source, header, {n for n in names if n in OUTPUTS}, where)
-    for one_taken in taken:
-        own = pd.DataFrame([{one_taken.kind.quantity: 1.0, "U": numbers.get("U"), "file": path.name, "row": 1}])
-        part = {one_taken.kind.quantity} if one_taken.kind.primed else set()
-        made = dimensional(own, part, source.normalisation, header, where).iloc[0]
-        factors.append(float(made[one_taken.kind.quantity]) * one_taken.kind.factor)
-    channels, matrix = off_samples(names, taken, np.array(factors))
+
+    def to_si(kind: Column) -> float:
+        if not kind.primed:
+            return kind.factor
+        one = pd.DataFrame([{kind.quantity: 1.0, "U": numbers.get("U"), "file": path.name, "row": 1}])
+        made = dimensional(one, {kind.quantity}, source.normalisation, header, where).iloc[0]
+        return float(made[kind.quantity]) * kind.factor
+
+    factors = np.array([to_si(kind) for kind in (*(k for _, k in wanted), *(t.kind for t in taken))])
+    channels, matrix = off_samples(names, taken, factors)
 
     def pieces() -> Iterator[np.ndarray]:
         for block in sheet.numbers([*(i for i, _ in wanted), *(t.at for t in taken)]):

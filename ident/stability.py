@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ident.derivatives import loads, prime_scale, slope, steps
 from sim import kernel
-from sim.catalogue import OUTPUTS
+from sim.catalogue import OUTPUTS, STATES
 from sim.coefficients import Coefficients
 from sim.model import Environment, added_mass_matrix, assemble
 from sim.simulate import mixer_of, plane_limits
@@ -28,7 +28,6 @@ _HORIZONTAL = (1, 3, 5, 9)
 # Accelerations whose added mass a plane of motion cannot do without: w, q and v, r.
 _VERTICAL_INERTIA, _HORIZONTAL_INERTIA = (2, 4), (1, 5)
 _PLANES = ("vertical", "horizontal")
-_STATES = (*"uvwpqrxyz", "phi", "theta", "psi")
 _TABLE_STEP = 1e-4
 _DEFLECTION = math.radians(1.0)
 
@@ -157,7 +156,7 @@ def _linear(
     a = np.column_stack([change(step * np.eye(12)[j], none) / step for j in kept])
     b = change(np.zeros(12), _DEFLECTION * shares) / _DEFLECTION
     about = [float(state[j]) for j in kept]
-    return Linear(tuple(_STATES[j] for j in kept), axis, a.tolist(), b.tolist(), about)
+    return Linear(tuple(STATES[j] for j in kept), axis, a.tolist(), b.tolist(), about)
 
 
 def _eigenvalues(linear: Linear) -> list[tuple[float, float]]:

@@ -17,6 +17,8 @@ from functools import cache
 from importlib.resources import files
 
 OUTPUTS = ("X", "Y", "Z", "K", "M", "N")
+# The state in its order: velocities in the body frame, position and angles in the earth frame.
+STATES = ("u", "v", "w", "p", "q", "r", "x", "y", "z", "phi", "theta", "psi")
 SETS = ("reduced", "gertler_hagen", "mmg")
 # Extrapolation rules of an axis; ``sim.tables`` implements them.
 RULES = {

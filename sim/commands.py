@@ -9,12 +9,13 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from sim import events, maneuver
+from sim.catalogue import STATES
 from sim.events import Programme
 from sim.schema import Data
 
 Positive = Annotated[float, Field(gt=0)]
 _ANGLES, _RATES = ("phi", "theta", "psi"), ("p", "q", "r")
-_WATCHED = ("u", "v", "w", "p", "q", "r", "x", "y", "z", "phi", "theta", "psi", "U", "point_depth")
+_WATCHED = (*STATES, "U", "point_depth")
 _LAWS = {"fixed": maneuver.FIXED, "pid": maneuver.PID, "zigzag": maneuver.ZIGZAG, "programme": maneuver.PROGRAMME}
 
 

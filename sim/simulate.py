@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from sim import maneuver
 from sim.case import Case
+from sim.catalogue import STATES
 from sim.coefficients import Coefficients
 from sim.commands import compile_programme, law_code
 from sim.errors import InputError
@@ -26,7 +27,6 @@ Array = NDArray[np.float64]
 _SPAN = 0.4
 # Speeds up to this many times the initial one have mean wave loads of their own.
 _FASTER = 1.25
-_STATES = ("u", "v", "w", "p", "q", "r", "x", "y", "z", "phi", "theta", "psi")
 
 # Channels a reference may hold, with the unit of the simulation.
 CHANNELS = dict.fromkeys(("u", "v", "w", "U"), "m/s") | dict.fromkeys(("p", "q", "r"), "rad/s")
@@ -86,7 +86,7 @@ class Simulation:
 
 def columns_of(vehicle: Vehicle, tanks: bool) -> tuple[str, ...]:
     """Columns of a record, with or without tanks in use."""
-    return ("t", *_STATES, *[p.name for p in vehicle.planes], "n", *(TANKS if tanks else ()), "dV", "dH")
+    return ("t", *STATES, *[p.name for p in vehicle.planes], "n", *(TANKS if tanks else ()), "dV", "dH")
 
 
 def samples_of(case: Case) -> tuple[int, int]:

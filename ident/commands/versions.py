@@ -21,11 +21,11 @@ def report(db: str, version: int | None, vehicle: str, out: Path, json_path: str
     \b
     Example: ident report --version 0
     """
-    from ident.report import make_report
+    from ident.report import write_report
 
     console = console_for(quiet=json_path == "-")
     with console.status("drawing every coefficient"):
-        done = make_report(db, version, out, vehicle)
+        done = write_report(db, version, out, vehicle)
     console.print(f"report: {done['file']}", highlight=False)
     if json_path:
         emit(done, json_path)
