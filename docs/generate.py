@@ -19,16 +19,16 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
 import ident
-from ident.calibrated import run as calibrate
-from ident.derivatives import derivatives
-from ident.figures import case_figure
-from ident.findings import rules
-from ident.fit import fit
-from ident.scoreboard import entries, run_all
-from sim import catalogue
-from sim.case import load_case
-from sim.coefficients import Coefficients
-from sim.model import Environment
+from ident.analysis.derivatives import derivatives
+from ident.calibration.version import run as calibrate
+from ident.checks.findings import rules
+from ident.fitting.fit import fit
+from ident.validation.figures import case_figure
+from ident.validation.scoreboard import entries, run_all
+from sim.boat import catalogue
+from sim.boat.coefficients import Coefficients
+from sim.flight.case import load_case
+from sim.kernel.assemble import Environment
 
 CASE = "hzz20"
 

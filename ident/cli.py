@@ -23,7 +23,7 @@ class Commands(click.Group):
             raise
         except Exception as error:
             # Imported only now: the help of a command has no need of it.
-            from sim.errors import InputError
+            from sim.files.errors import InputError
 
             if not isinstance(error, InputError):
                 raise

@@ -10,7 +10,7 @@ from pathlib import Path
 
 def check_folder(path: Path) -> None:
     """Refuse a folder that cannot be written to or made. Raises ``InputError``."""
-    from sim.errors import InputError
+    from sim.files.errors import InputError
 
     if path.exists() and not path.is_dir():
         raise InputError(str(path), "a file", "a folder to write to")
@@ -23,7 +23,7 @@ def check_folder(path: Path) -> None:
 
 def check_file(path: Path) -> None:
     """Refuse a file that cannot be written. Raises ``InputError``."""
-    from sim.errors import InputError
+    from sim.files.errors import InputError
 
     if path.is_dir():
         raise InputError(str(path), "a folder", "a file to write")
@@ -38,10 +38,10 @@ def whole(path: Path) -> Iterator[Path]:
 
     Raises
     ------
-    sim.errors.InputError
+    sim.files.errors.InputError
         When it cannot be written; nothing is left then.
     """
-    from sim.errors import InputError
+    from sim.files.errors import InputError
 
     part = path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")
     try:

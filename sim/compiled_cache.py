@@ -23,7 +23,7 @@ PREFIX = "ident-compiled-"
 # Folders that stay whatever their age, and the age [s] below which any stays.
 _KEPT = 5
 _RECENT = 86400.0
-_IMPORTS = re.compile(r"^(?:from|import) sim\.(\w+)|^from sim import \(?([\w\s,]+)", re.MULTILINE)
+_IMPORTS = re.compile(r"^(?:from|import) sim((?:\.\w+)+)(?: import \(?([\w\s,]+))?", re.MULTILINE)
 
 
 def compiled_sources(folder: Path) -> list[Path]:
@@ -35,20 +35,22 @@ def compiled_sources(folder: Path) -> list[Path]:
 
     Returns
     -------
-    Paths by name. Programs (``__main__``) do not count: nothing is compiled into other modules
-    from them, and their own loops call these modules only.
+    Paths by name. The benchmarks do not count: nothing is compiled into other modules from them,
+    and their own loops call these modules only.
     """
-    text = {path.stem: path.read_text(encoding="utf-8") for path in folder.glob("*.py")}
-    todo = [name for name, source in text.items() if "cache=True" in source and "__main__" not in source]
+    text = {
+        ".".join(path.relative_to(folder).with_suffix("").parts): path.read_text(encoding="utf-8")
+        for path in folder.rglob("*.py")
+    }
+    todo = [name for name, source in text.items() if "cache=True" in source and not name.startswith("bench.")]
     found: set[str] = set()
     while todo:
         name = todo.pop()
         if name in text and name not in found:
             found.add(name)
-            todo += [
-                word for one, several in _IMPORTS.findall(text[name]) for word in [one, *re.split(r"\W+", several)]
-            ]
-    return [folder / f"{name}.py" for name in sorted(found)]
+            for module, names in _IMPORTS.findall(text[name]):
+                todo += [module[1:], *(f"{module[1:]}.{word}" for word in re.split(r"\W+", names))]
+    return [folder.joinpath(*name.split(".")).with_suffix(".py") for name in sorted(found)]
 
 
 def sources_key(folder: Path) -> str:
@@ -56,7 +58,7 @@ def sources_key(folder: Path) -> str:
     digest = hashlib.sha256()
     for path in compiled_sources(folder):
         content = path.read_bytes()
-        digest.update(f"{path.name}:{len(content)}:".encode())
+        digest.update(f"{path.relative_to(folder).as_posix()}:{len(content)}:".encode())
         digest.update(content)
     return digest.hexdigest()[:16]
 

@@ -14,13 +14,13 @@ import numpy as np
 import pytest
 from hypothesis import settings
 
-from ident.campaign import read_campaign
-from ident.identify import identify
-from ident.store import commit, database_rows
-from sim.catalogue import OUTPUTS
-from sim.coefficients import Coefficients
-from sim.forces import axis_values, boat_features, multiplier, plane_features
-from sim.model import Environment, assemble
+from ident.captive.campaign import read_campaign
+from ident.database.store import commit, database_rows
+from ident.identification.identify import identify
+from sim.boat.catalogue import OUTPUTS
+from sim.boat.coefficients import Coefficients
+from sim.boat.forces import axis_values, boat_features, multiplier, plane_features
+from sim.kernel.assemble import Environment, assemble
 
 ROOT = Path(__file__).parents[1]
 

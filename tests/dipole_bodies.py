@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from sim.mean_loads import DipoleBody, plane_waves
-from sim.model import cross_matrix
+from sim.kernel.assemble import cross_matrix
+from sim.waves.mean_loads import DipoleBody, plane_waves
 
 RHO, G = 1025.0, 9.81
 # Roll is held.

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from ident.findings import Body, run_table
+from ident.checks.findings import Body, run_table
 
 DATASETS = Path(__file__).parents[2] / "shared" / "datasets"
 HMRI = DATASETS / "kvlcc2_hmri_pmm"

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ident.campaign import read_campaign
+from ident.captive.campaign import read_campaign
 
 HEAD = """name = "made"
 vehicle = "bb2"

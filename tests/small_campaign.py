@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from ident.campaign import read_campaign
-from ident.identify import identify
-from ident.store import database_rows
-from sim.errors import InputError
+from ident.captive.campaign import read_campaign
+from ident.database.store import database_rows
+from ident.identification.identify import identify
+from sim.files.errors import InputError
 
 HEADER = """name = "small"
 vehicle = "bb2"

@@ -11,12 +11,12 @@ from click.testing import CliRunner
 from flights_in_waves import made_flight
 from PIL import Image
 
-from ident.animation import animate, sampled
+from ident.animation.film import animate, sampled
+from ident.animation.silhouette import from_above, from_the_side, silhouette
 from ident.commands.animate import animate as command
-from ident.silhouette import from_above, from_the_side, silhouette
-from sim.errors import InputError
-from sim.vehicle import load_vehicle
-from sim.waves import regular
+from sim.boat.vehicle import load_vehicle
+from sim.files.errors import InputError
+from sim.waves.linear import regular
 
 
 @pytest.fixture(scope="module")

@@ -5,15 +5,17 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sim import kernel, maneuver, plain
-from sim.case import load_case
-from sim.coefficients import Coefficients
-from sim.commands import TankCommand
-from sim.errors import InputError
-from sim.events import progress
-from sim.model import Environment, assemble, with_tanks
-from sim.simulate import initial_state, mixer_of, model_of, plane_limits, settings_of, simulate
-from sim.trim import NoEquilibrium, self_propulsion
+from sim.boat.coefficients import Coefficients
+from sim.files.errors import InputError
+from sim.flight import maneuver
+from sim.flight.case import load_case
+from sim.flight.commands import TankCommand
+from sim.flight.events import progress
+from sim.flight.simulate import initial_state, mixer_of, model_of, plane_limits, settings_of, simulate
+from sim.flight.trim import NoEquilibrium, self_propulsion
+from sim.kernel import plain
+from sim.kernel import rhs as kernel
+from sim.kernel.assemble import Environment, assemble, with_tanks
 
 STATE = np.array([5.0, 0.3, -0.2, 0.02, 0.01, -0.015, 0.0, 0.0, 40.0, 0.15, 0.05, 0.3])
 CONTROLS = np.array([0.1, 0.2, -0.1, 0.05, 0.03, 1.2])

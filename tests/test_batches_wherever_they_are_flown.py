@@ -8,13 +8,13 @@ from importlib.util import find_spec
 import numpy as np
 import pytest
 
-from ident.bands import batch_of, covariance, draw, fly_samples
-from ident.cluster import over_dask
-from sim.case import Start, load_case
-from sim.coefficients import Coefficients
-from sim.errors import InputError
-from sim.model import Assembly, assemble
-from sim.simulate import environment_of, simulate
+from ident.validation.bands import batch_of, covariance, draw, fly_samples
+from ident.validation.cluster import over_dask
+from sim.boat.coefficients import Coefficients
+from sim.files.errors import InputError
+from sim.flight.case import Start, load_case
+from sim.flight.simulate import environment_of, simulate
+from sim.kernel.assemble import Assembly, assemble
 
 needs_dask = pytest.mark.skipif(find_spec("distributed") is None, reason="needs the extra dask")
 
@@ -111,7 +111,7 @@ def test_two_dask_processes_give_what_threads_give(cluster, case, campaign, rows
 @needs_dask
 @pytest.mark.parametrize("address", ["tcp://127.0.0.1:1", "nonsense", "tcp://no-such-host.invalid:8786"])
 def test_address_that_does_not_answer_is_named(address, case, campaign, rows, monkeypatch):
-    monkeypatch.setattr("ident.cluster._PATIENCE", 1)
+    monkeypatch.setattr("ident.validation.cluster._PATIENCE", 1)
     with pytest.raises(InputError) as refused:
         next(over_dask(address, batch_of(case, campaign.vehicle, rows), []))
     assert address in refused.value.where
@@ -120,7 +120,7 @@ def test_address_that_does_not_answer_is_named(address, case, campaign, rows, mo
 
 @needs_dask
 def test_workers_of_another_version_are_refused(cluster, case, campaign, rows, monkeypatch):
-    monkeypatch.setattr("ident.cluster.__version__", "9.9.9")
+    monkeypatch.setattr("ident.validation.cluster.__version__", "9.9.9")
     with pytest.raises(InputError, match=r"9\.9\.9"):
         next(over_dask(cluster.scheduler_address, batch_of(case, campaign.vehicle, rows), []))
 

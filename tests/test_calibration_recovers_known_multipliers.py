@@ -11,16 +11,16 @@ import pandas as pd
 import pytest
 from click.testing import CliRunner
 
-from ident.bands import covariance
-from ident.calibrate import calibrate, contradictions, problem
-from ident.calibrated import calibrated_rows, run
-from ident.calibration import apply, load_calibration, parameters
+from ident.calibration.estimate import calibrate, contradictions, problem
+from ident.calibration.file import apply, load_calibration, parameters
+from ident.calibration.version import calibrated_rows, run
 from ident.cli import main
-from sim.case import load_case
-from sim.coefficients import Coefficients
-from sim.database import own_version, read_rows, versions
-from sim.errors import InputError
-from sim.simulate import simulate
+from ident.validation.bands import covariance
+from sim.boat.coefficients import Coefficients
+from sim.boat.database import own_version, read_rows, versions
+from sim.files.errors import InputError
+from sim.flight.case import load_case
+from sim.flight.simulate import simulate
 
 CHANNELS = ("psi", "r", "phi", "u")
 UNITS = {"psi": "rad", "r": "rad/s", "phi": "rad", "u": "m/s"}
@@ -141,7 +141,7 @@ def test_neutral_multipliers_change_nothing(task, rows):
 
 
 def test_calibrating_twice_gives_the_same_version(folder, fitted_db, tmp_path, rows):
-    from ident.store import commit
+    from ident.database.store import commit
 
     db = str(tmp_path / "db")
     commit(db, rows, {"message": "captive"})
@@ -180,7 +180,7 @@ def test_sources_that_contradict_one_another_are_named(folder, campaign, rows, t
 
 
 def test_two_names_for_one_group_cannot_be_told_apart(folder, campaign, rows):
-    from ident.calibrated import _identifiability
+    from ident.calibration.version import _identifiability
 
     twice = {"planes": GROUPS["planes"], "planes_again": GROUPS["planes"]}
     spec, where, _ = load_calibration(write_calibration(folder, groups=twice, name="twice"))
@@ -203,7 +203,7 @@ def test_two_names_for_one_group_cannot_be_told_apart(folder, campaign, rows):
     ],
 )
 def test_a_users_mistake_gives_one_message_and_no_version(folder, rows, tmp_path, change, found):
-    from ident.store import commit
+    from ident.database.store import commit
 
     db = str(tmp_path / "db")
     commit(db, rows, {"message": "captive"})

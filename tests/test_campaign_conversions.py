@@ -12,10 +12,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from ident.campaign import read_campaign
-from ident.identify import identify
-from ident.store import database_rows
-from sim.catalogue import term
+from ident.captive.campaign import read_campaign
+from ident.database.store import database_rows
+from ident.identification.identify import identify
+from sim.boat.catalogue import term
 
 BB2 = Path(__file__).parents[1] / "raw_captive_data" / "bb2"
 AXES = ("speed_mps", "alpha_deg", "beta_deg", "delta_deg", "depth_m", "p_radps", "q_radps", "r_radps")

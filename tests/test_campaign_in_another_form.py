@@ -13,9 +13,9 @@ import pytest
 from made_campaigns import campaign
 from test_campaign_conversions import BB2, assert_same, header, number, rewritten, text
 
-from ident.campaign import read_campaign
-from sim.errors import InputError
-from sim.frames import Frame, FrameError
+from ident.captive.campaign import read_campaign
+from sim.files.errors import InputError
+from sim.files.frames import Frame, FrameError
 
 AXES = {
     "x": (["X_N", "udot_mps2", "x_m"], ["K_Nm", "p_radps", "pdot_radps2"]),

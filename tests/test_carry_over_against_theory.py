@@ -7,10 +7,10 @@ import math
 import numpy as np
 import pytest
 
-from ident import carry_over as c
-from ident.downwash import tail_downwash, vortex_pair
-from sim.errors import InputError
-from sim.vehicle import load_vehicle
+from ident.estimates import carry_over as c
+from ident.estimates.downwash import tail_downwash, vortex_pair
+from sim.boat.vehicle import load_vehicle
+from sim.files.errors import InputError
 
 
 @pytest.fixture(scope="module")

@@ -7,12 +7,12 @@ import itertools
 import numpy as np
 import pytest
 
-from sim import kernel
-from sim.catalogue import OUTPUTS
-from sim.coefficients import Coefficients
-from sim.forces import plane_features
-from sim.model import assemble, rigid_body_matrix
-from sim.simulate import mixer_of
+from sim.boat.catalogue import OUTPUTS
+from sim.boat.coefficients import Coefficients
+from sim.boat.forces import plane_features
+from sim.flight.simulate import mixer_of
+from sim.kernel import rhs as kernel
+from sim.kernel.assemble import assemble, rigid_body_matrix
 
 U0 = 5.14444
 

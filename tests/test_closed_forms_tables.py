@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sim.tables import Table, axis_weights, extend_axis
+from sim.boat.tables import Table, axis_weights, extend_axis
 
 RULES = ("hold", "linear", "linear_load", "drift_odd", "drift_even")
 

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
+from setuptools import find_packages
 
 from ident.cli import main
 
@@ -42,7 +43,8 @@ def test_every_command_of_the_readme_is_there_with_an_example():
 
 def test_every_package_folder_is_in_the_wheel():
     with (ROOT / "pyproject.toml").open("rb") as stream:
-        packages = tomllib.load(stream)["tool"]["setuptools"]["packages"]
+        rule = tomllib.load(stream)["tool"]["setuptools"]["packages"]["find"]
+    packages = find_packages(ROOT, include=rule["include"])
     folders = {p.parent for top in ("ident", "sim") for p in (ROOT / top).rglob("*.py")}
     assert sorted(packages) == sorted(".".join(f.relative_to(ROOT).parts) for f in folders)
 

@@ -14,9 +14,9 @@ import pandas as pd
 import pytest
 
 from ident import __version__
-from ident.store import _commit, commit, digest
-from sim.database import column_order, correlation_pairs, read_rows, versions
-from sim.errors import InputError
+from ident.database.store import _commit, commit, digest
+from sim.boat.database import column_order, correlation_pairs, read_rows, versions
+from sim.files.errors import InputError
 
 
 @pytest.fixture(scope="module")
@@ -164,8 +164,8 @@ def test_commit_returns_its_own_version_when_another_follows_at_once(few, db, mo
 
 LOOP = """
 import sys
-from ident.store import commit
-from sim.database import correlation_pairs, read_rows
+from ident.database.store import commit
+from sim.boat.database import correlation_pairs, read_rows
 path = sys.argv[1]
 rows, _ = read_rows(path)
 print("ready", flush=True)
@@ -176,9 +176,9 @@ for k in range(10_000):
 
 ROUNDS = """
 import sys
-from ident.store import commit
-from sim.database import correlation_pairs, read_rows
-from sim.errors import InputError
+from ident.database.store import commit
+from sim.boat.database import correlation_pairs, read_rows
+from sim.files.errors import InputError
 source, mine = sys.argv[1], float(sys.argv[2])
 rows, _ = read_rows(source)
 print("ready", flush=True)

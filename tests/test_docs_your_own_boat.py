@@ -12,11 +12,11 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
-from ident.campaign import read_campaign
+from ident.captive.campaign import read_campaign
 from ident.cli import main
-from ident.identify import identify
-from ident.store import database_rows
-from sim.database import read_rows
+from ident.database.store import database_rows
+from ident.identification.identify import identify
+from sim.boat.database import read_rows
 
 ROOT = Path(__file__).parents[1]
 PAGE = (ROOT / "docs" / "your-own-boat.md").read_text("utf-8")

@@ -8,12 +8,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from sim.emergence import cells, lost_buoyancy
-from sim.pressure import Quadrature, rotation
-from sim.spectra import Spectrum, realise
-from sim.surface import read_geometry
-from sim.wave_loads import evaluate, make_sea, passage
-from sim.waves import kinematics, regular
+from sim.hull.emergence import cells, lost_buoyancy
+from sim.hull.surface import read_geometry
+from sim.waves.linear import kinematics, regular
+from sim.waves.loads import evaluate, make_sea, passage
+from sim.waves.pressure import Quadrature, rotation
+from sim.waves.spectra import Spectrum, realise
 
 RHO_G = 1025.0 * 9.81
 A, B = 30.0, 4.0

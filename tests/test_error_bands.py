@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ident.bands import Bands, covariance, draw, fly_samples, inside, variance_shares
-from sim.case import load_case, load_reference
-from sim.coefficients import Coefficients
-from sim.simulate import simulate
+from ident.validation.bands import Bands, covariance, draw, fly_samples, inside, variance_shares
+from sim.boat.coefficients import Coefficients
+from sim.flight.case import load_case, load_reference
+from sim.flight.simulate import simulate
 
 
 @pytest.fixture(scope="module")
@@ -56,7 +56,7 @@ def test_a_drawn_boat_is_port_starboard_symmetric(campaign, rows):
     step = draw(correlation, 1, seed=5)[0]
     place = dict(zip(estimates["estimate"], range(len(estimates)), strict=True))
     base = Coefficients(campaign.vehicle, rows)
-    from ident.bands import _row_steps
+    from ident.validation.bands import _row_steps
 
     index, signed = _row_steps(rows, estimates)
     moved = rows["value"].to_numpy() + np.where(index >= 0, step[index] * signed, 0.0)

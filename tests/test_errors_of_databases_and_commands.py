@@ -5,10 +5,10 @@ from __future__ import annotations
 import pytest
 from small_campaign import RUNS, fitted, write
 
+from ident.database.store import commit
 from ident.output import whole
-from ident.store import commit
-from sim.database import read_rows, versions
-from sim.errors import InputError
+from sim.boat.database import read_rows, versions
+from sim.files.errors import InputError
 
 
 def test_database_path_that_is_a_file_is_refused(tmp_path):

@@ -7,8 +7,8 @@ import warnings
 import pytest
 from small_campaign import HEADER, RUNS, assert_refused, fitted, write
 
-from ident.campaign import find_campaigns
-from sim.errors import InputError
+from ident.captive.campaign import find_campaigns
+from sim.files.errors import InputError
 
 
 def test_the_small_campaign_itself_is_accepted(tmp_path):

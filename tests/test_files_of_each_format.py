@@ -31,13 +31,13 @@ from made_campaigns import (
     tidy,
 )
 
-from ident.campaign import read_campaign
+from ident.captive.campaign import read_campaign
+from ident.captive.quantities import factor, table
+from ident.captive.source import Source
 from ident.cli import main
-from ident.identify import identify
-from ident.quantities import factor, table
-from ident.readers.source import Source
-from ident.store import database_rows
-from sim.errors import InputError
+from ident.database.store import database_rows
+from ident.identification.identify import identify
+from sim.files.errors import InputError
 
 
 def body(form, delimiter: str = ",") -> str:

@@ -27,9 +27,9 @@ from made_campaigns import (
     tidy,
 )
 
-from ident.campaign import read_campaign
-from ident.quantities import factor
-from sim.errors import InputError
+from ident.captive.campaign import read_campaign
+from ident.captive.quantities import factor
+from sim.files.errors import InputError
 
 HEADER = ["beta_deg", "X [N]", "Y [N]", "N [N m]"]
 

@@ -12,12 +12,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from ident.campaign import read_campaign
-from ident.identify import identify
-from ident.store import database_rows, digest
-from sim.case import load_case, load_reference
-from sim.frames import DIRECTIONS, Frame, FrameError
-from sim.vehicle import load_vehicle
+from ident.captive.campaign import read_campaign
+from ident.database.store import database_rows, digest
+from ident.identification.identify import identify
+from sim.boat.vehicle import load_vehicle
+from sim.files.frames import DIRECTIONS, Frame, FrameError
+from sim.flight.case import load_case, load_reference
 
 SOURCE = Frame("aft", "starboard", "up")
 RIGHT_HANDED = [

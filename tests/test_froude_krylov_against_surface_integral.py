@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sim.pressure import froude_krylov, quadrature, reference_load, rotation, surface_load
-from sim.spectra import sea_state
-from sim.surface import read_geometry
-from sim.waves import regular
+from sim.hull.surface import read_geometry
+from sim.waves.linear import regular
+from sim.waves.pressure import froude_krylov, quadrature, reference_load, rotation, surface_load
+from sim.waves.spectra import sea_state
 
 RHO, G, L = 1025.0, 9.81, 70.2
 SAIL_TOP = 11.37

@@ -7,12 +7,13 @@ import pandas as pd
 import pytest
 from scipy.integrate import solve_ivp
 
-from sim import kernel, maneuver
-from sim.case import load_case
-from sim.coefficients import Coefficients
-from sim.database import axis_columns
-from sim.model import assemble
-from sim.simulate import initial_state, plane_limits, settings_of, simulate
+from sim.boat.coefficients import Coefficients
+from sim.boat.database import axis_columns
+from sim.flight import maneuver
+from sim.flight.case import load_case
+from sim.flight.simulate import initial_state, plane_limits, settings_of, simulate
+from sim.kernel import rhs as kernel
+from sim.kernel.assemble import assemble
 
 # Appended SUBOFF derivatives (model.md section 10), and round values where it names none.
 SMOOTH = {

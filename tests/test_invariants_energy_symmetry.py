@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sim import kernel
-from sim.case import load_case
-from sim.coefficients import Coefficients
-from sim.model import assemble, rigid_body_matrix
-from sim.parts import mirror_of, vehicle_terms
-from sim.simulate import simulate
+from sim.boat.coefficients import Coefficients
+from sim.boat.parts import mirror_of, vehicle_terms
+from sim.flight.case import load_case
+from sim.flight.simulate import simulate
+from sim.kernel import rhs as kernel
+from sim.kernel.assemble import assemble, rigid_body_matrix
 
 PLANES = 5
 # State order u v w p q r x y z phi theta psi: what changes sign in the mirror.

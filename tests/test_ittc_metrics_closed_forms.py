@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ident import turning, vertical
-from ident.measure import reference_channels
-from sim.case import load_case, load_reference
+from ident.metrics import turning, vertical
+from ident.metrics.measure import reference_channels
+from sim.flight.case import load_case, load_reference
 
 # -- turns -------------------------------------------------------------------------------
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sim import kernel
-from sim.catalogue import BOAT_FEATURES, PLANE_FEATURES
-from sim.coefficients import Coefficients
-from sim.forces import boat_features, plane_features
-from sim.model import assemble
+from sim.boat.catalogue import BOAT_FEATURES, PLANE_FEATURES
+from sim.boat.coefficients import Coefficients
+from sim.boat.forces import boat_features, plane_features
+from sim.kernel import rhs as kernel
+from sim.kernel.assemble import assemble
 
 PLANES = 5
 # Within the tables, and far beyond them: stall of hull and planes, crash-back, surface.

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ident.campaign import read_campaign
+from ident.captive.campaign import read_campaign
 
 DATA = Path(__file__).parents[2] / "shared" / "datasets"
 HMRI = DATA / "kvlcc2_hmri_pmm"

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sim.errors import InputError
-from sim.spectra import Spectrum, bretschneider, jonswap, moments, realise, sea_state
-from sim.waves import Waves, kinematics, make_waves, regular
+from sim.files.errors import InputError
+from sim.waves.linear import Waves, kinematics, make_waves, regular
+from sim.waves.spectra import Spectrum, bretschneider, jonswap, moments, realise, sea_state
 
 RHO, G = 1025.0, 9.81
 POINTS = np.array([[12.0, -30.0, 5.0], [0.0, 0.0, 0.5], [-55.0, 21.0, 14.0]])

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from made_campaigns import CONSTANTS, STEADY, campaign, history
 
-from ident.campaign import read_campaign
-from ident.provenance import conversions, steps
-from sim.errors import InputError
+from ident.captive.campaign import read_campaign
+from ident.database.provenance import conversions, steps
+from sim.files.errors import InputError
 
 AXES = {
     "program": 'x = "forward"\ny = "starboard"\nz = "down"\nangles = "flight"',

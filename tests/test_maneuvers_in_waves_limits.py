@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 from numba import njit
 
-from ident.sea_cases import in_waves, irregular_waves, regular_waves, turn_drift
-from sim.case import Case, WavesData, load_case
-from sim.in_waves import shares, surroundings, water_around
-from sim.mean_loads import dipole_body, plane_waves, scattering
-from sim.pressure import rotation
-from sim.simulate import model_of, simulate, water_of
-from sim.surroundings import prepare, read_gauge
-from sim.waves import kinematics, regular
+from ident.metrics.in_waves import in_waves, irregular_waves, regular_waves, turn_drift
+from sim.flight.case import Case, WavesData, load_case
+from sim.flight.simulate import model_of, simulate, water_of
+from sim.waves.in_waves import shares, surroundings, water_around
+from sim.waves.linear import kinematics, regular
+from sim.waves.mean_loads import dipole_body, plane_waves, scattering
+from sim.waves.pressure import rotation
+from sim.waves.surroundings import prepare, read_gauge
 
 
 def _changed(name: str, **parts: dict) -> Case:
@@ -182,7 +182,7 @@ def test_the_surface_answers_little_to_a_boat_in_long_waves(coefficients, enviro
 
 
 def test_waves_need_the_geometry_of_the_vehicle(coefficients):
-    from sim.errors import InputError
+    from sim.files.errors import InputError
 
     bare = type(coefficients).__new__(type(coefficients))
     vehicle = coefficients.vehicle.model_copy(deep=True, update={"geometry": None})
@@ -207,7 +207,7 @@ def test_waves_need_the_geometry_of_the_vehicle(coefficients):
 def test_a_mistake_in_the_waves_of_a_case_is_named(tmp_path, waves, words):
     from importlib.resources import files
 
-    from sim.errors import InputError
+    from sim.files.errors import InputError
 
     text = (files("sim") / "cases" / "ss5-4m.toml").read_text("utf-8")
     first, last = text.index("[waves]"), text.index("[initial]")

@@ -13,7 +13,7 @@ import pandas as pd
 import pytest
 from dipole_bodies import FREE, spheroid
 
-from sim.mean_loads import plane_waves, scattering
+from sim.waves.mean_loads import plane_waves, scattering
 
 TABLE = pd.read_csv(Path(__file__).parent / "data" / "mean_loads_capytaine.csv")
 SLENDER, SPHERE = TABLE[TABLE.a_m > TABLE.b_m], TABLE[TABLE.a_m == TABLE.b_m]

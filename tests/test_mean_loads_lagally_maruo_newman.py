@@ -15,9 +15,9 @@ import numpy as np
 import pytest
 from dipole_bodies import FREE, RHO, G, assembled, kochin, lamb, spheroid
 
-from sim.mean_loads import DipoleBody, mean_loads, plane_waves, rigid_response, scattering
-from sim.pressure import Quadrature, fill_rotation, froude_krylov
-from sim.waves import make_waves
+from sim.waves.linear import make_waves
+from sim.waves.mean_loads import DipoleBody, mean_loads, plane_waves, rigid_response, scattering
+from sim.waves.pressure import Quadrature, fill_rotation, froude_krylov
 
 
 def lopsided(free):
@@ -111,7 +111,7 @@ def test_a_long_circular_cylinder_in_beam_seas_sends_nothing_back():
 
 @pytest.mark.parametrize(("speed", "heading"), [(0.0, 0.4), (5.0, np.pi), (5.0, 2.2), (3.0, 0.3)])
 def test_what_the_simulator_has_is_the_time_average_of_its_load(speed, heading):
-    """Froude-Krylov load of ``sim.pressure`` averaged along the boat's own first-order motion, earth axes."""
+    """Froude-Krylov load of ``sim.waves.pressure`` averaged along the boat's own first-order motion, earth axes."""
     body, depth, frequency, amplitude = spheroid(30.0, 4.0), 15.0, 0.7, 0.02
     number, _, velocity = incident(body, frequency, [heading])
     encounter = frequency - number * speed * np.cos(heading)

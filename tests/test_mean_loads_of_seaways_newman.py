@@ -7,11 +7,11 @@ from copy import copy
 import numpy as np
 import pytest
 
-from sim.in_waves import volume_points
-from sim.mean_loads import dipole_body, mean_loads
-from sim.spectra import Spectrum, realise
-from sim.wave_drift import add_mean, make_drift, tabulate
-from sim.waves import make_waves, regular
+from sim.waves.drift import add_mean, make_drift, tabulate
+from sim.waves.in_waves import volume_points
+from sim.waves.linear import make_waves, regular
+from sim.waves.mean_loads import dipole_body, mean_loads
+from sim.waves.spectra import Spectrum, realise
 
 RHO, G = 1025.0, 9.81
 TOP = 11.37

@@ -15,7 +15,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from small_campaign import HEADER, RUNS, fitted, write
 
-from sim.errors import InputError
+from sim.files.errors import InputError
 
 
 @st.composite

@@ -25,12 +25,12 @@ from test_files_of_each_format import MAP, PATTERNS, PLAIN, ROWS, STAR, tidy
 from test_openfoam_versions import PARTS, REAL, SOURCE, STATE, VERSIONS
 from test_quality_checks_from_a_campaign_folder import CONFIGURED, ship
 
-from ident.campaign import read_campaign
-from ident.checks import check_campaign
-from ident.identify import identify
-from ident.store import commit, database_rows
-from sim.catalogue import OUTPUTS
-from sim.errors import InputError
+from ident.captive.campaign import read_campaign
+from ident.checks.check import check_campaign
+from ident.database.store import commit, database_rows
+from ident.identification.identify import identify
+from sim.boat.catalogue import OUTPUTS
+from sim.files.errors import InputError
 
 EXAMPLES = int(os.environ.get("IDENT_MUTATIONS", "40"))
 MUTATED = settings(
@@ -236,7 +236,7 @@ def test_damaged_campaign_file(tmp_path, data):
 
 def test_a_refused_campaign_leaves_the_database_as_it_was(tmp_path):
     """Read and identify come before commit: a bad file in a later source commits nothing."""
-    from sim.database import read_rows, versions
+    from sim.boat.database import read_rows, versions
 
     source, name, content = CASES["tidy"]
     campaign(tmp_path / "c", source)
@@ -245,7 +245,7 @@ def test_a_refused_campaign_leaves_the_database_as_it_was(tmp_path):
     rows = database_rows(identify(read_campaign(tmp_path / "c")))
     commit(db, rows, {"message": "good"})
     (tmp_path / "c" / name).write_bytes(content + b"8,nan,3,4\n")
-    from ident.fit import fit
+    from ident.fitting.fit import fit
 
     with pytest.raises(InputError, match="row 5"):
         fit(tmp_path / "c", db)

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ident.least_squares import gain_matrix, weights
-from ident.regression import least_squares
+from ident.identification.stage_solve import gain_matrix, weights
+from ident.timeseries.regression import least_squares
 
 FOLDER = Path(__file__).parent / "data" / "nist_strd"
 SETS = ["Norris", "Pontius", "NoInt1", "NoInt2", "Filip", "Longley", *(f"Wampler{k}" for k in range(1, 6))]

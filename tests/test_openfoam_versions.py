@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from made_campaigns import CONSTANTS, STEADY, campaign, history
 
-from ident.campaign import read_campaign
-from ident.readers import openfoam
-from sim.errors import InputError
+from ident.captive.campaign import read_campaign
+from ident.captive.readers import openfoam
+from sim.files.errors import InputError
 
 REAL = Path(__file__).parent / "data" / "openfoam_v1912_plate"
 RNG = np.random.default_rng(7)

@@ -11,13 +11,13 @@ import pandas as pd
 import pytest
 from click.testing import CliRunner
 
-from ident.bands import fly_samples, inside
 from ident.cli import main
-from ident.validate import validate
-from sim.case import load_case, load_reference
-from sim.coefficients import Coefficients
-from sim.errors import InputError
-from sim.simulate import simulate
+from ident.validation.bands import fly_samples, inside
+from ident.validation.validate import validate
+from sim.boat.coefficients import Coefficients
+from sim.files.errors import InputError
+from sim.flight.case import load_case, load_reference
+from sim.flight.simulate import simulate
 
 DATA = files("sim") / "cases" / "data"
 
@@ -117,7 +117,7 @@ def test_missing_own_reference_is_named(tmp_path, fitted_db):
 
 def test_track_is_compared_at_equal_path_length(coefficients):
     """A reference made of the flight itself, over its path length, has no error."""
-    from ident.validate import rmse
+    from ident.validation.validate import rmse
 
     case, _ = load_case("turn20-23.69m")
     flown = simulate(case, coefficients)

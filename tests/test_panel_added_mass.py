@@ -12,10 +12,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from sim.added_mass import depth_table, panel_added_mass, solid_angle, wetted_panels
-from sim.errors import InputError
-from sim.mesh import joined
-from sim.surface import Hull, hull_mesh, read_geometry
+from sim.files.errors import InputError
+from sim.hull.added_mass import depth_table, panel_added_mass, solid_angle, wetted_panels
+from sim.hull.mesh import joined
+from sim.hull.surface import Hull, hull_mesh, read_geometry
 
 BB2 = Path(__file__).parents[1] / "sim" / "vehicles" / "bb2"
 PUBLISHED = Path(__file__).parents[1] / ".." / "shared" / "bb2" / "geometry" / "added_mass_vs_depth.csv"

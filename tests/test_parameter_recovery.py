@@ -15,11 +15,11 @@ import pandas as pd
 import pytest
 from scipy.optimize import brentq
 
-from ident.campaign import Campaign
-from ident.identify import Identification, identify
-from ident.store import database_rows
-from sim.coefficients import Coefficients
-from sim.forces import axis_values, boat_features, body_velocity, multiplier, plane_features
+from ident.captive.campaign import Campaign
+from ident.database.store import database_rows
+from ident.identification.identify import Identification, identify
+from sim.boat.coefficients import Coefficients
+from sim.boat.forces import axis_values, boat_features, body_velocity, multiplier, plane_features
 
 BB2 = Path(__file__).parents[1] / "sim" / "vehicles" / "bb2.toml"
 OUTPUTS = ("X", "Y", "Z", "K", "M", "N")

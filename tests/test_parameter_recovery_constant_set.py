@@ -9,9 +9,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from ident.campaign import read_campaign
-from ident.identify import identify
-from ident.store import database_rows
+from ident.captive.campaign import read_campaign
+from ident.database.store import database_rows
+from ident.identification.identify import identify
 
 BB2 = Path(__file__).parents[1] / "sim" / "vehicles" / "bb2.toml"
 OUTPUTS = ("X", "Y", "Z", "K", "M", "N")

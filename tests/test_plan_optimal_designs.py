@@ -18,16 +18,16 @@ import pandas as pd
 import pytest
 from click.testing import CliRunner
 
-from ident.campaign import read_campaign
+from ident.captive.campaign import read_campaign
 from ident.cli import main
-from ident.design import Design, d_optimal, fewest_runs
-from ident.identify import Solver, identify
-from ident.plan import make_plan, planned_campaign
-from ident.plan_candidates import Facility, Levels, planned_tests, read_facility
-from ident.plan_output import matrix
-from sim.catalogue import OUTPUTS
-from sim.errors import InputError
-from sim.forces import multiplier
+from ident.identification.identify import Solver, identify
+from ident.planning.candidates import Facility, Levels, planned_tests, read_facility
+from ident.planning.design import Design, d_optimal, fewest_runs
+from ident.planning.matrix import matrix
+from ident.planning.plan import make_plan, planned_campaign
+from sim.boat.catalogue import OUTPUTS
+from sim.boat.forces import multiplier
+from sim.files.errors import InputError
 
 BB2 = Path(__file__).parents[1] / "raw_captive_data" / "bb2"
 LINE = np.linspace(-1.0, 1.0, 41)

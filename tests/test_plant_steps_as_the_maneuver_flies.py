@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sim.case import load_case
-from sim.errors import InputError
-from sim.plant import Plant
-from sim.simulate import simulate
+from sim.files.errors import InputError
+from sim.flight.case import load_case
+from sim.flight.plant import Plant
+from sim.flight.simulate import simulate
 
 DOCS = Path(__file__).parents[1] / "docs" / "plant-model.md"
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from sim.case import load_case
-from sim.commands import Event, PlaneCommand, PlaneStep, SpeedCommand, SpeedStep
-from sim.simulate import simulate
+from sim.flight.case import load_case
+from sim.flight.commands import Event, PlaneCommand, PlaneStep, SpeedCommand, SpeedStep
+from sim.flight.simulate import simulate
 
 DEPTH = {"P_z": 3.0, "I_z": 0.1044, "D_z": 3.0, "P_theta": 3.0, "I_theta": 0.1466, "D_theta": 3.0}
 

@@ -12,13 +12,13 @@ import pytest
 from click.testing import CliRunner
 from made_campaigns import campaign, history
 
-from ident.campaign import read_campaign
+from ident.captive.campaign import read_campaign
 from ident.cli import main
-from ident.fit import fit
-from ident.provenance import conversions, steps
-from ident.report import write_report
-from ident.store import commit
-from sim.database import versions
+from ident.database.provenance import conversions, steps
+from ident.database.store import commit
+from ident.fitting.fit import fit
+from ident.report.page import write_report
+from sim.boat.database import versions
 
 ROWS = """run_id,test,part,U_mps,alpha_deg,beta_deg,D0_m,X_N,Y_N,Z_N,K_Nm,M_Nm,N_Nm,rel_sigma,quality,source
 A1,drift_horizontal,hull,2,0,-8,25,-20,60,1,1,1,40,0.02,ok,made

@@ -12,12 +12,12 @@ import pandas as pd
 import pytest
 from click.testing import CliRunner
 
-from ident.campaign import read_campaign
+from ident.captive.campaign import read_campaign
+from ident.captive.quantities import HARMONICS
 from ident.cli import main
-from ident.identify import identify
-from ident.quantities import HARMONICS
-from ident.store import database_rows
-from sim.catalogue import term
+from ident.database.store import database_rows
+from ident.identification.identify import identify
+from sim.boat.catalogue import term
 
 ROOT = Path(__file__).parents[1]
 DATA = ROOT.parent / "shared" / "datasets"

@@ -10,8 +10,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ident.metrics import roll_decay, zigzag
-from sim.case import load_case, load_reference
+from ident.metrics.zigzag import roll_decay, zigzag
+from sim.flight.case import load_case, load_reference
 
 HZZ20 = {
     "EXP": {
@@ -90,7 +90,7 @@ def test_roll_decay_of_a_damped_cosine():
 
 def test_every_bundled_case_flies_and_is_compared(fitted_db):
     """The scoreboard: a finite error for every channel, ratios over the published model."""
-    from ident.scoreboard import run_all
+    from ident.validation.scoreboard import run_all
 
     board, flown = run_all(fitted_db, None, None)
     assert [c["case"] for c in board["cases"]] == [f.case.name for f in flown]

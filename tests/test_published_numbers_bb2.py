@@ -10,11 +10,11 @@ import pandas as pd
 import pytest
 from scipy.linalg import eigh
 
-from sim import kernel
-from sim.coefficients import Coefficients
-from sim.model import added_mass_matrix, assemble, rigid_body_matrix
-from sim.simulate import mixer_of, plane_limits
-from sim.trim import NoEquilibrium, self_propulsion
+from sim.boat.coefficients import Coefficients
+from sim.flight.simulate import mixer_of, plane_limits
+from sim.flight.trim import NoEquilibrium, self_propulsion
+from sim.kernel import rhs as kernel
+from sim.kernel.assemble import added_mass_matrix, assemble, rigid_body_matrix
 
 SHARED = Path(__file__).parents[2] / "shared"
 # Source frame (x aft, z up) to program frame: a turn of 180 deg about y.

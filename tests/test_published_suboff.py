@@ -12,21 +12,21 @@ import pandas as pd
 import pytest
 from click.testing import CliRunner
 
-from ident.campaign import read_campaign
+from ident.analysis.derivatives import checks
+from ident.analysis.stability import stability
+from ident.captive.campaign import read_campaign
 from ident.cli import main
-from ident.derivatives import checks
-from ident.fit import fit
-from ident.identify import identify
-from ident.report import write_report
-from ident.stability import stability
-from ident.store import commit, database_rows
-from sim.case import load_case
-from sim.coefficients import Coefficients
-from sim.database import own_version, read_rows
-from sim.errors import InputError
-from sim.model import Environment
-from sim.simulate import simulate
-from sim.vehicle import load_vehicle
+from ident.database.store import commit, database_rows
+from ident.fitting.fit import fit
+from ident.identification.identify import identify
+from ident.report.page import write_report
+from sim.boat.coefficients import Coefficients
+from sim.boat.database import own_version, read_rows
+from sim.boat.vehicle import load_vehicle
+from sim.files.errors import InputError
+from sim.flight.case import load_case
+from sim.flight.simulate import simulate
+from sim.kernel.assemble import Environment
 
 ROOT = Path(__file__).parents[1]
 SUBOFF = ROOT / "raw_captive_data" / "suboff"
@@ -297,10 +297,10 @@ def test_another_frame_and_reference_length_give_the_same_coefficients(tmp_path)
 
 def test_turned_signs_are_those_of_a_turned_load():
     """The load of a turned motion with the turned coefficient is the turned load."""
-    from ident.published import turn_sign
-    from sim.catalogue import PLANE_FEATURES, terms
-    from sim.forces import boat_features, multiplier
-    from sim.frames import Frame
+    from ident.captive.published import turn_sign
+    from sim.boat.catalogue import PLANE_FEATURES, terms
+    from sim.boat.forces import boat_features, multiplier
+    from sim.files.frames import Frame
 
     frame, rng = Frame("forward", "port", "up"), np.random.default_rng(1)
     velocity, rates = rng.normal(size=3), rng.normal(size=3)

@@ -20,13 +20,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from made_campaigns import CONSTANTS, HEAD, STEADY, campaign, history
 
-from ident.campaign import read_campaign
-from ident.checks import check_campaign
+from ident.captive.campaign import read_campaign
+from ident.checks.check import check_campaign
+from ident.checks.findings import Body, Evidence, registered, rules, run_table
 from ident.cli import main
-from ident.clock import Clock
-from ident.findings import Body, Evidence, registered, rules, run_table
-from sim.errors import InputError
-from sim.vehicle import load_vehicle
+from ident.timeseries.clock import Clock
+from sim.boat.vehicle import load_vehicle
+from sim.files.errors import InputError
 
 ROOT = Path(__file__).parents[1]
 SUBOFF = ROOT / "raw_captive_data" / "suboff"

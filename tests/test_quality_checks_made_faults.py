@@ -20,15 +20,15 @@ from click.testing import CliRunner
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ident.checks import evidence_of, run
-from ident.checks_copies import digits
-from ident.checks_tables import vertical_partner
+from ident.checks.check import evidence_of, run
+from ident.checks.copies import digits
+from ident.checks.findings import registered, rules, spans
+from ident.checks.tables import vertical_partner
 from ident.cli import main
-from ident.findings import registered, rules, spans
-from ident.report import write_report
-from ident.store import commit
-from sim.catalogue import OUTPUTS
-from sim.database import versions
+from ident.database.store import commit
+from ident.report.page import write_report
+from sim.boat.catalogue import OUTPUTS
+from sim.boat.database import versions
 
 BB2 = Path(__file__).parents[1] / "raw_captive_data" / "bb2"
 

@@ -11,11 +11,11 @@ import pytest
 from made_campaigns import CONSTANTS, campaign, history
 from scipy.signal import lfilter
 
-from ident.campaign import read_campaign
-from ident.condense import Condensed, constant, harmonics
-from ident.reduction import autocovariance, burg, fit_history
-from ident.reduction_figures import history_figures
-from sim.errors import InputError
+from ident.captive.campaign import read_campaign
+from ident.captive.history_figures import history_figures
+from ident.timeseries.blocks import Condensed, constant, harmonics
+from ident.timeseries.reduction import autocovariance, burg, fit_history
+from sim.files.errors import InputError
 
 
 def ar1(phi: float, n: int, series: int, seed: int) -> np.ndarray:

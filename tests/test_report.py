@@ -11,18 +11,18 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from ident.campaign import read_campaign
-from ident.derivatives import checks, derivatives
-from ident.identify import identify
-from ident.report import write_report
-from ident.report_figures import _group, quality_colours
-from ident.store import commit, database_rows
-from sim.coefficients import Coefficients
-from sim.database import column_order, read_rows, versions
-from sim.errors import InputError
-from sim.model import Environment
-from sim.parts import vehicle_terms
-from sim.vehicle import load_vehicle
+from ident.analysis.derivatives import checks, derivatives
+from ident.captive.campaign import read_campaign
+from ident.database.store import commit, database_rows
+from ident.identification.identify import identify
+from ident.report.figures import _group, quality_colours
+from ident.report.page import write_report
+from sim.boat.coefficients import Coefficients
+from sim.boat.database import column_order, read_rows, versions
+from sim.boat.parts import vehicle_terms
+from sim.boat.vehicle import load_vehicle
+from sim.files.errors import InputError
+from sim.kernel.assemble import Environment
 
 BB2 = Path(__file__).parents[1] / "raw_captive_data" / "bb2"
 SPEED, DEPTH = 5.14444, 25.0

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from ident.campaign import read_campaign
-from ident.identify import identify
-from ident.scoreboard import geometric_mean, is_trained, run_all, show
-from ident.store import commit, database_rows
-from ident.validate import validate
+from ident.captive.campaign import read_campaign
+from ident.database.store import commit, database_rows
+from ident.identification.identify import identify
+from ident.validation.scoreboard import geometric_mean, is_trained, run_all, show
+from ident.validation.validate import validate
 
 ROOT = Path(__file__).parents[1]
 CASES = ["roll-decay", "vzz10-10kt", "vzz10-06kt", "meander", "suboff-hzz10"]
@@ -38,7 +38,7 @@ def _suboff():
 @pytest.fixture(scope="module")
 def board(database):
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("ident.scoreboard.case_names", lambda folder: CASES)
+        patch.setattr("ident.validation.scoreboard.case_names", lambda folder: CASES)
         return run_all(database, None, None, workers=2)[0]
 
 
@@ -85,7 +85,7 @@ def test_parent_is_the_vehicles_own_earlier_version(board):
 
 def test_first_version_has_no_parent(database):
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("ident.scoreboard.case_names", lambda folder: CASES[:1])
+        patch.setattr("ident.validation.scoreboard.case_names", lambda folder: CASES[:1])
         first = run_all(database, 0, None)[0]
     entry = first["cases"][0]["references"]["EXP"]["phi"]
     assert (first["cases"][0]["parent"], entry["parent_rmse"], entry["ratio_to_parent"]) == (None, None, None)
@@ -94,7 +94,7 @@ def test_first_version_has_no_parent(database):
 
 def test_board_does_not_depend_on_workers(database, board):
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("ident.scoreboard.case_names", lambda folder: CASES)
+        patch.setattr("ident.validation.scoreboard.case_names", lambda folder: CASES)
         alone = run_all(database, None, None, workers=1)[0]
     assert json.dumps(alone) == json.dumps(board)
 

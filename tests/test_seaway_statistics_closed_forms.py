@@ -11,12 +11,12 @@ import pytest
 from flights_in_waves import gaussian, made_flight
 from scipy.signal import lfilter
 
-from ident.exceedance import exceedances, extreme, rice_rate
-from ident.seakeeping_figures import exceedance_figure, seaway_figure, spectrum_figure
-from ident.seaway import encountered, spectrum, statistics, statistics_of, zero_crossing
-from sim.errors import InputError
-from sim.spectra import Spectrum, bretschneider, moments, realise
-from sim.waves import regular
+from ident.metrics.exceedance import exceedances, extreme, rice_rate
+from ident.metrics.seaway import encountered, spectrum, statistics, statistics_of, zero_crossing
+from ident.validation.wave_figures import exceedance_figure, seaway_figure, spectrum_figure
+from sim.files.errors import InputError
+from sim.waves.linear import regular
+from sim.waves.spectra import Spectrum, bretschneider, moments, realise
 
 GRID = np.linspace(1e-3, 2.0 * math.pi, 100001)
 

@@ -10,12 +10,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.linalg import expm
 
-from ident.stability import critical_speed, stability, stability_index
-from sim.case import load_case
-from sim.model import assemble
-from sim.plant import Plant
-from sim.simulate import mixer_of, plane_limits
-from sim.trim import self_propulsion
+from ident.analysis.stability import critical_speed, stability, stability_index
+from sim.flight.case import load_case
+from sim.flight.plant import Plant
+from sim.flight.simulate import mixer_of, plane_limits
+from sim.flight.trim import self_propulsion
+from sim.kernel.assemble import assemble
 
 # Roddy (1990), DTRC/SHD-1298-08, Table 4, fully appended: force, moment, force by rate,
 # moment by rate, index.
@@ -92,9 +92,9 @@ def test_bb2_horizontal_index_agrees_with_its_roots(coefficients, environment):
 
 def test_least_stable_lateral_root_is_seen_in_a_flight(coefficients, environment):
     """A small disturbance of the trimmed boat decays as the eigenvalue says."""
-    from sim import maneuver
-    from sim.case import load_case
-    from sim.simulate import settings_of
+    from sim.flight import maneuver
+    from sim.flight.case import load_case
+    from sim.flight.simulate import settings_of
 
     found = stability(coefficients, environment, 5.14444, 23.69)
     model = assemble(coefficients, environment)

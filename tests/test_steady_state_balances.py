@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sim import kernel
-from sim.case import load_case
-from sim.simulate import simulate
+from sim.flight.case import load_case
+from sim.flight.simulate import simulate
+from sim.kernel import rhs as kernel
 
 
 @pytest.fixture(scope="module")

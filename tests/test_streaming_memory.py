@@ -13,8 +13,8 @@ import pandas as pd
 import pytest
 from made_campaigns import campaign, history
 
-from ident.campaign import read_campaign
-from sim.errors import InputError
+from ident.captive.campaign import read_campaign
+from sim.files.errors import InputError
 
 NAMES = 'names = ["time [s]", "X [N]", "Y [N]"]'
 MEGABYTE = 1 << 20
@@ -37,7 +37,7 @@ def tank_file(path, megabytes: int) -> int:
 CHILD = """
 import resource, sys
 from pathlib import Path
-from ident.campaign import read_campaign
+from ident.captive.campaign import read_campaign
 for name in sys.argv[1:]:
     read_campaign(Path(name))
     print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)

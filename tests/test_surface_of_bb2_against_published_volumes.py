@@ -8,9 +8,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from sim.errors import InputError
-from sim.mesh import Mesh, MeshError, joined
-from sim.surface import Hull, hull_mesh, read_geometry
+from sim.files.errors import InputError
+from sim.hull.mesh import Mesh, MeshError, joined
+from sim.hull.surface import Hull, hull_mesh, read_geometry
 
 BB2 = Path(__file__).parents[1] / "sim" / "vehicles" / "bb2"
 PUBLISHED = Path(__file__).parents[1] / ".." / "shared" / "bb2" / "geometry"

@@ -10,14 +10,15 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from sim import catalogue, kernel
-from sim.catalogue import ACCELERATIONS, OUTPUTS, CatalogueError
-from sim.coefficients import Coefficients
-from sim.database import axis_columns
-from sim.forces import boat_features, multiplier, plane_features
-from sim.model import Environment, added_mass_matrix, assemble
-from sim.parts import mirror_of, parts_of, vehicle_terms
-from sim.vehicle import load_vehicle
+from sim.boat import catalogue
+from sim.boat.catalogue import ACCELERATIONS, OUTPUTS, CatalogueError
+from sim.boat.coefficients import Coefficients
+from sim.boat.database import axis_columns
+from sim.boat.forces import boat_features, multiplier, plane_features
+from sim.boat.parts import mirror_of, parts_of, vehicle_terms
+from sim.boat.vehicle import load_vehicle
+from sim.kernel import rhs as kernel
+from sim.kernel.assemble import Environment, added_mass_matrix, assemble
 
 SETS = catalogue.SETS
 ALL = [(s, t) for s in SETS for t in catalogue.terms(s)]

@@ -6,10 +6,10 @@ from importlib.resources import files
 
 import pytest
 
-from ident.validate import validate
-from sim.case import load_case
-from sim.errors import InputError
-from sim.vehicle import load_vehicle
+from ident.validation.validate import validate
+from sim.boat.vehicle import load_vehicle
+from sim.files.errors import InputError
+from sim.flight.case import load_case
 
 TEXT = (files("sim") / "cases" / "roll-decay.toml").read_text("utf-8")
 SERIES = (files("sim") / "cases" / "data" / "roll_decay.csv").read_text("utf-8")

@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 from unbounded_panels import Panels
 
-from sim import wave_loads
-from sim.added_mass import wetted_panels
-from sim.in_waves import water_around
-from sim.surface import read_geometry
-from sim.waves import regular
+from sim.hull.added_mass import wetted_panels
+from sim.hull.surface import read_geometry
+from sim.waves import loads as wave_loads
+from sim.waves.in_waves import water_around
+from sim.waves.linear import regular
 
 SPEED, DEPTH = 5.14444, 35.0624
 X_Z_M = [0, 2, 4]

@@ -13,10 +13,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from sim import wave_loads
-from sim.pressure import froude_krylov, quadrature, rotation
-from sim.surface import read_geometry
-from sim.waves import kinematics, make_waves, regular
+from sim.hull.surface import read_geometry
+from sim.waves import loads as wave_loads
+from sim.waves.linear import kinematics, make_waves, regular
+from sim.waves.pressure import froude_krylov, quadrature, rotation
 
 RHO, G = 1025.0, 9.81
 A, B = 30.0, 4.0

@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from sim import wave_loads, wave_passage
-from sim.in_waves import probes, section_masses, volume_points, water_around
-from sim.model import Environment, added_mass_matrix
-from sim.pressure import froude_krylov, rotation
-from sim.spectra import Spectrum, realise
-from sim.waves import Waves, kinematics, regular
+from sim.kernel.assemble import Environment, added_mass_matrix
+from sim.waves import loads as wave_loads
+from sim.waves import passage as wave_passage
+from sim.waves.in_waves import probes, section_masses, volume_points, water_around
+from sim.waves.linear import Waves, kinematics, regular
+from sim.waves.pressure import froude_krylov, rotation
+from sim.waves.spectra import Spectrum, realise
 
 RHO, G = 1025.0, 9.81
 
@@ -198,7 +199,7 @@ def test_a_calm_surface_needs_no_place_of_the_propeller(coefficients):
 
 
 def test_a_vehicle_without_geometry_or_propeller_place_is_told_so(coefficients):
-    from sim.errors import InputError
+    from sim.files.errors import InputError
 
     vehicle = coefficients.vehicle.model_copy(deep=True, update={"geometry": None})
     with pytest.raises(InputError, match="key geometry"):

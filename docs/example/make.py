@@ -15,14 +15,14 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from sim.case import Case, load_case
-from sim.catalogue import ACCELERATIONS, OUTPUTS
-from sim.coefficients import Coefficients
-from sim.database import axis_columns
-from sim.forces import boat_features, body_velocity, multiplier, plane_features
-from sim.parts import vehicle_terms
-from sim.simulate import simulate
-from sim.vehicle import load_vehicle
+from sim.boat.catalogue import ACCELERATIONS, OUTPUTS
+from sim.boat.coefficients import Coefficients
+from sim.boat.database import axis_columns
+from sim.boat.forces import boat_features, body_velocity, multiplier, plane_features
+from sim.boat.parts import vehicle_terms
+from sim.boat.vehicle import load_vehicle
+from sim.flight.case import Case, load_case
+from sim.flight.simulate import simulate
 
 HERE = Path(__file__).resolve().parent
 RATIO, TANK, NOISE = 12.0, 1000.0, 0.02

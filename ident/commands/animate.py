@@ -54,7 +54,7 @@ def film(
 
     Parameters
     ----------
-    case, db, version, vehicle : As for ``ident.validate.validate``.
+    case, db, version, vehicle : As for ``ident.validation.validate.validate``.
     out : File; the case's name as GIF when None.
     pictures : Number of frames, frames a second, start and end [s] or None.
     json_path : Where to write what was drawn as JSON, ``-`` for standard output.
@@ -66,10 +66,10 @@ def film(
     """
     from rich.progress import Progress
 
-    from ident.animation import animate as draw
-    from ident.animation import writer_of
-    from ident.validate import validate
-    from sim.database import version_words
+    from ident.animation.film import animate as draw
+    from ident.animation.film import writer_of
+    from ident.validation.validate import validate
+    from sim.boat.database import version_words
 
     frames, fps, start, end = pictures
     console = console_for(quiet=json_path == "-")

@@ -25,8 +25,8 @@ def fit(folder: Path, db: str, message: str, json_path: str | None, strict: bool
     \b
     Example: ident fit raw_captive_data/ --db coeff_db
     """
-    from ident.fit import fit as run
-    from ident.fit import show
+    from ident.fitting.fit import fit as run
+    from ident.fitting.fit import show
 
     console = console_for(quiet=json_path == "-")
     with console.status("reading, checking and identifying"):
@@ -47,8 +47,8 @@ def check(folder: Path, json_path: str | None, strict: bool) -> None:
     \b
     Example: ident check raw_captive_data/ --json -
     """
-    from ident.campaign import find_campaigns, read_campaign
-    from ident.checks import check_campaign, show
+    from ident.captive.campaign import find_campaigns, read_campaign
+    from ident.checks.check import check_campaign, show
 
     console = console_for(quiet=json_path == "-")
     found: list[dict[str, Any]] = []
@@ -76,11 +76,11 @@ def plan(folder: Path, target_rel: float, facility: Path | None, out: Path | Non
     \b
     Example: ident plan raw_captive_data/bb2 --target-rel 0.1 --out plan.csv
     """
-    from ident.campaign import find_campaigns, read_campaign
-    from ident.plan import make_plan
-    from ident.plan_candidates import read_facility
-    from ident.plan_output import show, summary, write_matrix
-    from sim.errors import InputError
+    from ident.captive.campaign import find_campaigns, read_campaign
+    from ident.planning.candidates import read_facility
+    from ident.planning.matrix import show, summary, write_matrix
+    from ident.planning.plan import make_plan
+    from sim.files.errors import InputError
 
     paths = find_campaigns(folder)
     if len(paths) > 1:
@@ -108,7 +108,7 @@ def runs(folder: Path, out: Path, json_path: str | None) -> None:
     \b
     Example: ident runs raw_captive_data/ --out reports
     """
-    from ident.list_runs import as_json, read, show
+    from ident.captive.list_runs import as_json, read, show
 
     console = console_for(quiet=json_path == "-")
     with console.status("reading and reducing"):
@@ -117,7 +117,7 @@ def runs(folder: Path, out: Path, json_path: str | None) -> None:
         show(campaign, console)
     histories = tuple(one for campaign in found for one in campaign.reduced)
     if histories:
-        from ident.reduction_figures import history_figures
+        from ident.captive.history_figures import history_figures
 
         for path in history_figures(histories, out):
             console.print(f"figure: {path}", highlight=False)

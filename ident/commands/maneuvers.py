@@ -75,7 +75,7 @@ def validate(
     console = console_for(quiet=json_path == "-")
     with equilibrium_of(case or "of --all"):
         done, result = _one(case, db, version, own, console) if case else _all(db, version, cases, console)
-    from ident.figures import case_figure
+    from ident.validation.figures import case_figure
 
     bands = _bands(done[0], result, samples, seed, dask, console) if samples else None
     for one in done:
@@ -93,7 +93,7 @@ def _sea_figures(done: list[Any], out: Path) -> list[Path]:
     """Further figures of cases in waves."""
     if not any(one.case.waves for one in done):
         return []
-    from ident.sea_cases import harmonics_over_depth, sea_figures
+    from ident.metrics.in_waves import harmonics_over_depth, sea_figures
 
     return [figure for one in done for figure in sea_figures(one, out)] + harmonics_over_depth(done, out)
 
@@ -101,7 +101,7 @@ def _sea_figures(done: list[Any], out: Path) -> list[Path]:
 def _one(
     case: str, db: str, version: int | None, own: dict[str, Any], console: Any
 ) -> tuple[list[Any], dict[str, Any]]:
-    from ident.validate import show, validate
+    from ident.validation.validate import show, validate
 
     with console.status("flying the case (the first run on a machine compiles: half a minute, in waves two)"):
         done = validate(case, db, version, own["vehicle"], own["reference"], own["frame"])
@@ -113,7 +113,7 @@ def _bands(one: Any, result: dict[str, Any], samples: int, seed: int, dask: str 
     """Fly the samples with a progress bar; adds ``bands`` to the result and prints it."""
     from rich.progress import Progress
 
-    from ident.bands import fly_samples, show, summary
+    from ident.validation.bands import fly_samples, show, summary
 
     with Progress(console=console, transient=True) as progress:
         task = progress.add_task("flying samples", total=samples)
@@ -129,7 +129,7 @@ def _bands(one: Any, result: dict[str, Any], samples: int, seed: int, dask: str 
 
 
 def _all(db: str, version: int | None, cases: Path | None, console: Any) -> tuple[list[Any], dict[str, Any]]:
-    from ident.scoreboard import run_all, show
+    from ident.validation.scoreboard import run_all, show
 
     with console.status("flying") as status:
         board, done = run_all(db, version, cases, lambda name: status.update(f"flying {name}"))
@@ -154,7 +154,7 @@ def calibrate(name: str, db: str, version: int | None, message: str, left_out: b
     Example: ident calibrate bb2
              ident calibrate my_boat.toml --no-left-out --json -
     """
-    from ident.calibrated import run, show
+    from ident.calibration.version import run, show
 
     console = console_for(quiet=json_path == "-")
     with console.status("calibrating") as status:
@@ -186,13 +186,13 @@ def stability(
     \b
     Example: ident stability --speed 3 --speed 5 --depth 25
     """
-    from ident.stability import as_json, show
-    from ident.stability import stability as at
-    from sim.case import load_case
-    from sim.coefficients import Coefficients
-    from sim.database import read_rows
-    from sim.model import Environment
-    from sim.vehicle import load_vehicle
+    from ident.analysis.stability import as_json, show
+    from ident.analysis.stability import stability as at
+    from sim.boat.coefficients import Coefficients
+    from sim.boat.database import read_rows
+    from sim.boat.vehicle import load_vehicle
+    from sim.flight.case import load_case
+    from sim.kernel.assemble import Environment
 
     data, where = load_case(case)
     vehicle = load_vehicle(data.vehicle, beside=where)

@@ -57,7 +57,7 @@ def emit(data: Any, target: str) -> None:
 
     Raises
     ------
-    sim.errors.InputError
+    sim.files.errors.InputError
         When the file cannot be written.
     """
     text = json.dumps(data, indent=2, allow_nan=False)
@@ -73,8 +73,8 @@ def emit(data: Any, target: str) -> None:
 @contextmanager
 def equilibrium_of(case: str) -> Iterator[None]:
     """Says of which case there is no equilibrium: ``NoEquilibrium`` becomes an ``InputError``."""
-    from sim.errors import InputError
-    from sim.trim import NoEquilibrium
+    from sim.files.errors import InputError
+    from sim.flight.trim import NoEquilibrium
 
     try:
         yield

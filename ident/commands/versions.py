@@ -21,7 +21,7 @@ def report(db: str, version: int | None, vehicle: str, out: Path, json_path: str
     \b
     Example: ident report --version 0
     """
-    from ident.report import write_report
+    from ident.report.page import write_report
 
     console = console_for(quiet=json_path == "-")
     with console.status("drawing every coefficient"):
@@ -44,7 +44,7 @@ def versions(db: str, json_path: str | None) -> None:
 
     from rich.table import Table
 
-    from sim.database import versions as read
+    from sim.boat.database import versions as read
 
     keys = ("vehicle", "campaign", "digest", "parent", "program", "message")
     found = [
@@ -77,7 +77,7 @@ def diff(first: int, second: int, db: str, json_path: str | None) -> None:
     """
     from rich.table import Table
 
-    from ident.compare import difference
+    from ident.database.compare import difference
 
     found = difference(db, first, second)
     if json_path:
@@ -107,7 +107,7 @@ def export(folder: Path, kind: str, db: str, version: int | None, json_path: str
     \b
     Example: ident export --version 0 --format csv exported/
     """
-    from ident.compare import export as run
+    from ident.database.compare import export as run
 
     done = run(db, version, kind, folder)
     if json_path != "-":

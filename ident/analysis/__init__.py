@@ -1,0 +1,1 @@
+"""Linear derivatives and stability of a version."""

@@ -1,0 +1,288 @@
+"""`ident stability`: stability indices, eigenvalues and critical speeds from a version."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ident.analysis.derivatives import loads, prime_scale, slope, steps
+from sim.boat.catalogue import OUTPUTS, STATES
+from sim.boat.coefficients import Coefficients
+from sim.boat.vehicle import Vehicle
+from sim.flight.simulate import mixer_of, plane_limits
+from sim.flight.trim import NoEquilibrium, self_propulsion
+from sim.kernel import rhs as kernel
+from sim.kernel.assemble import Environment, added_mass_matrix, assemble
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+Array = NDArray[np.float64]
+# States of the linearised boat: positions x, y and heading are neutral and left out.
+_VERTICAL = (0, 2, 4, 8, 10)
+_HORIZONTAL = (1, 3, 5, 9)
+# Accelerations whose added mass a plane of motion cannot do without: w, q and v, r.
+_VERTICAL_INERTIA, _HORIZONTAL_INERTIA = (2, 4), (1, 5)
+_PLANES = ("vertical", "horizontal")
+_TABLE_STEP = 1e-4
+_DEFLECTION = math.radians(1.0)
+
+
+@dataclass(frozen=True)
+class Linear:
+    """x' = A x + b c of small changes x from a steady state, and c from the command that holds it.
+
+    Attributes
+    ----------
+    states : Names of x; m/s, rad/s, m and rad, x forward, y starboard, z down.
+    command : dV or dH [rad], through the mixer; without the delay of the actuators.
+    a, b : (n, n) and (n,).
+    about : (n,) values of the states that x are the changes from.
+    """
+
+    states: tuple[str, ...]
+    command: str
+    a: list[list[float]]
+    b: list[float]
+    about: list[float]
+
+
+@dataclass(frozen=True)
+class Stability:
+    """Stability of straight level motion at one speed and depth.
+
+    Attributes
+    ----------
+    speed, depth : U [m/s], D0 [m].
+    g_vertical, g_horizontal : Stability indices Gv, Gh; positive is stable. None when the
+        derivatives of that plane of motion are absent.
+    neutral_point_vertical, neutral_point_horizontal : Where a cross force gives no turn,
+        x of the neutral point over L, positive ahead of the origin; None as above.
+    critical_speed_stern, critical_speed_sail : Speed [m/s] at which the planes no longer
+        change the depth (reversal speed), by group; None when there is none.
+    vertical, horizontal : Eigenvalues [1/s] of the motion about ``about``, real and imaginary
+        part, least stable first; empty when there is no such state, or no added mass of
+        that plane of motion.
+    linear : The linear models these are of, vertical and horizontal, as far as there are any.
+    about : ``self-propulsion``, or ``speed held``: straight and level with the planes at
+        zero and without surge, for a vehicle without propulsion data.
+    """
+
+    speed: float
+    depth: float
+    g_vertical: float | None
+    g_horizontal: float | None
+    neutral_point_vertical: float | None
+    neutral_point_horizontal: float | None
+    critical_speed_stern: float | None
+    critical_speed_sail: float | None
+    vertical: list[tuple[float, float]]
+    horizontal: list[tuple[float, float]]
+    linear: dict[str, Linear]
+    about: str
+
+
+def stability_index(force: float, moment: float, force_rate: float, moment_rate: float, mass: float) -> float:
+    """Stability index G of one plane of motion.
+
+    Gv = 1 - M_w (Z_q + m') / (Z_w M_q), Gh = 1 - N_v (Y_r - m') / (Y_v N_r), Feldman
+    (1987); straight motion is stable for G > 0.
+
+    Parameters
+    ----------
+    force, moment : Z_w, M_w or Y_v, N_v in prime form.
+    force_rate, moment_rate : Z_q, M_q or Y_r, N_r in prime form.
+    mass : +m' for the vertical, -m' for the horizontal plane, m' = m / (1/2 rho L^3).
+
+    Returns
+    -------
+    G; infinite when force or moment_rate vanish.
+    """
+    damping = force * moment_rate
+    return 1.0 - moment * (force_rate + mass) / damping if damping else math.inf
+
+
+def critical_speed(stiffness: float, z_w: float, m_w: float, z_d: float, m_d: float) -> float | None:
+    """Reversal speed of a group of planes.
+
+    In steady straight motion Z_w w + Z_d U delta = 0 and M_w w U + M_d U^2 delta =
+    stiffness theta; the path angle theta - w/U vanishes at
+    U^2 = stiffness / (M_w - M_d Z_w / Z_d).
+
+    Parameters
+    ----------
+    stiffness : W BG / (1/2 rho L^3) [m^2/s^2].
+    z_w, m_w, z_d, m_d : Prime derivatives by w/U and by the deflection.
+
+    Returns
+    -------
+    Speed [m/s], None when the planes keep their sense at every speed.
+    """
+    if z_d == 0.0:
+        return None
+    turning = m_w - m_d * z_w / z_d
+    return math.sqrt(stiffness / turning) if stiffness * turning > 0.0 else None
+
+
+def _plane_slope(model: kernel.Model, vehicle: Vehicle, names: list[str], speed: float, depth: float) -> Array:
+    """Loads by the vertical command on some planes [N, N m per rad]."""
+    shares = np.array([p.mixer.dV if p.name in names else 0.0 for p in vehicle.planes])
+    motion = np.array([speed, 0.0, 0.0, 0.0, 0.0, 0.0])
+    up, down = (loads(model, motion, depth, np.append(s * _DEFLECTION * shares, 0.0)) for s in (1.0, -1.0))
+    return (up - down) / (2.0 * _DEFLECTION)
+
+
+def _linear(
+    model: kernel.Model, vehicle: Vehicle, state: Array, controls: Array, kept: tuple[int, ...], step: float
+) -> Linear:
+    """Central differences of the right-hand side; ``step`` in a state, a degree in the command."""
+    work = kernel.workspace(controls.size - 1)
+
+    def change(to_state: Array, to_controls: Array) -> Array:
+        side = []
+        for sign in (1.0, -1.0):
+            rate = np.zeros(12)
+            kernel.rhs(model, state + sign * to_state, controls + sign * to_controls, work, rate)
+            side.append(rate)
+        return np.asarray(side[0] - side[1])[list(kept)] / 2.0
+
+    axis = "dV" if 2 in kept else "dH"
+    shares = np.array([getattr(p.mixer, axis) for p in vehicle.planes] + [0.0])
+    none = np.zeros_like(controls)
+    a = np.column_stack([change(step * np.eye(12)[j], none) / step for j in kept])
+    b = change(np.zeros(12), _DEFLECTION * shares) / _DEFLECTION
+    about = [float(state[j]) for j in kept]
+    return Linear(tuple(STATES[j] for j in kept), axis, a.tolist(), b.tolist(), about)
+
+
+def _eigenvalues(linear: Linear) -> list[tuple[float, float]]:
+    """Least stable first."""
+    values = np.linalg.eigvals(np.array(linear.a))
+    return [(float(v.real), float(v.imag)) for v in sorted(values, key=lambda v: (-v.real, v.imag))]
+
+
+def _linear_models(
+    coefficients: Coefficients, environment: Environment, model: kernel.Model, speed: float, depth: float
+) -> tuple[dict[str, Linear], str]:
+    """Linear models, vertical and horizontal, as far as there are any; the state they are about."""
+    vehicle = coefficients.vehicle
+    step = _TABLE_STEP if vehicle.term_set == "reduced" else min(steps(vehicle))
+    kept, about = [_VERTICAL, _HORIZONTAL], "self-propulsion"
+    if coefficients.get("KT") is None:
+        kept, about = [_VERTICAL[1:], _HORIZONTAL], "speed held"
+        state, controls = np.zeros(12), np.zeros(len(vehicle.planes) + 1)
+        state[0], state[8] = speed, depth - model.sail_top
+    else:
+        try:
+            trim = self_propulsion(model, mixer_of(vehicle), speed, depth, plane_limits(vehicle)[0])
+        except NoEquilibrium:
+            return {}, about
+        state, controls = trim.state, trim.controls
+    added = np.diag(added_mass_matrix(coefficients, environment))
+    found = {}
+    for name, inertia, states in zip(_PLANES, (_VERTICAL_INERTIA, _HORIZONTAL_INERTIA), kept, strict=True):
+        if (added[list(inertia)] > 0.0).all():
+            found[name] = _linear(model, vehicle, state, controls, states, step)
+    return found, about
+
+
+def stability(coefficients: Coefficients, environment: Environment, speed: float, depth: float) -> Stability:
+    """Stability of straight level motion.
+
+    Parameters
+    ----------
+    coefficients : Of one vehicle.
+    environment : Water density and gravity.
+    speed, depth : U [m/s], D0 [m].
+
+    Returns
+    -------
+    Stability; derivatives of the whole boat with the steps of ``ident.analysis.derivatives``.
+    """
+    vehicle, model = coefficients.vehicle, assemble(coefficients, environment)
+    particulars = vehicle.particulars
+    length, density = particulars.length.value, environment.density
+    slopes = {m: slope(model, vehicle, m, speed, depth, 0.0) for m in "vwqr"}
+
+    def prime(symbol: str) -> float:
+        output, motion = symbol.split("_")
+        return float(slopes[motion][OUTPUTS.index(output)] / (prime_scale(output, motion, density, length) * speed))
+
+    volume = 0.5 * density * length**3
+    mass = particulars.mass.value / volume
+    bg = particulars.centre_of_gravity.value[2] - particulars.centre_of_buoyancy.value[2]
+    stiffness = model.weight * bg / volume
+    dynamic = 0.5 * density * length**2 * speed**2
+    reversal = {}
+    for group in ("stern", "sail"):
+        planes = [p.name for p in vehicle.planes if p.name.startswith(group)]
+        by_command = _plane_slope(model, vehicle, planes, speed, depth)
+        z_d, m_d = by_command[2] / dynamic, by_command[4] / (dynamic * length)
+        reversal[group] = critical_speed(stiffness, prime("Z_w"), prime("M_w"), z_d, m_d)
+
+    def index(motions: str, outputs: str, inertia: float) -> float | None:
+        force, moment, force_rate, moment_rate = (prime(f"{o}_{m}") for m in motions for o in outputs)
+        found = stability_index(force, moment, force_rate, moment_rate, inertia)
+        return found if math.isfinite(found) else None
+
+    def neutral_point(output: str, by: str, sign: float) -> float | None:
+        force = prime(f"{output[0]}_{by}")
+        return sign * prime(f"{output[1]}_{by}") / force if force else None
+
+    linear, about = _linear_models(coefficients, environment, model, speed, depth)
+    values = {name: _eigenvalues(one) for name, one in linear.items()}
+    return Stability(
+        speed=speed,
+        depth=depth,
+        g_vertical=index("wq", "ZM", mass),
+        g_horizontal=index("vr", "YN", -mass),
+        neutral_point_vertical=neutral_point("ZM", "w", -1.0),
+        neutral_point_horizontal=neutral_point("YN", "v", 1.0),
+        critical_speed_stern=reversal["stern"],
+        critical_speed_sail=reversal["sail"],
+        vertical=values.get("vertical", []),
+        horizontal=values.get("horizontal", []),
+        linear=linear,
+        about=about,
+    )
+
+
+def as_json(found: list[Stability]) -> list[dict[str, Any]]:
+    """The results as plain data; eigenvalues as [real, imaginary], linear models as states, command, a, b, about."""
+    return [asdict(s) for s in found]
+
+
+def show(found: list[Stability], title: str, console: Console) -> None:
+    """Print the results as a table."""
+    from rich.table import Table
+
+    table = Table(
+        *("U [m/s]", "D0 [m]", "Gv", "Gh", "neutral point v, h [L]", "critical speed stern, sail [m/s]"),
+        *("vertical [1/s]", "horizontal [1/s]"),
+        title=title,
+    )
+
+    def speed(value: float | None) -> str:
+        return "none" if value is None else f"{value:.2f}"
+
+    def root(values: list[tuple[float, float]]) -> str:
+        if not values:
+            return "-"
+        real, imaginary = values[0]
+        return f"{real:+.4f}" + (f" +-{abs(imaginary):.4f}i" if imaginary else "")
+
+    def number(value: float | None) -> str:
+        return "-" if value is None else f"{value:+.3f}"
+
+    for s in found:
+        points = f"{number(s.neutral_point_vertical)}, {number(s.neutral_point_horizontal)}"
+        critical = f"{speed(s.critical_speed_stern)}, {speed(s.critical_speed_sail)}"
+        signs = [f"[{'green' if (g or 0.0) > 0 else 'red'}]{number(g)}[/]" for g in (s.g_vertical, s.g_horizontal)]
+        table.add_row(f"{s.speed:.3f}", f"{s.depth:g}", *signs, points, critical, root(s.vertical), root(s.horizontal))
+    console.print(table)
+    states = " or ".join(dict.fromkeys(s.about for s in found))
+    console.print(f"last two columns: least stable root about straight level motion, {states}")

@@ -1,0 +1,1 @@
+"""A maneuver as a film."""

@@ -1,0 +1,1 @@
+"""Multipliers of coefficient groups from free-running maneuvers, as a new version."""

@@ -1,0 +1,278 @@
+"""What a calibration is: training series, groups of coefficients, priors. A data file says it.
+
+A group is a set of tabulated values that share one multiplier (or one offset). Its prior is
+what is known before any maneuver: the captive error of the group, a named estimate, or
+a stated range with its reason.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass
+from fnmatch import fnmatchcase
+from importlib.resources import files
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, model_validator
+
+from sim.boat import catalogue
+from sim.boat.database import axis_columns
+from sim.boat.vehicle import Vehicle, read_toml
+from sim.files.errors import InputError
+from sim.files.schema import Data, checked
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+Positive = Annotated[float, Field(gt=0)]
+# A multiplier further than this many captive standard errors from one needs another reason.
+ALLOWED = 2.0
+
+
+class Training(Data):
+    """One source of one case that the calibration learns from.
+
+    ``differs_from`` names another source of the same case; ``share`` of the mean squared
+    difference between the two counts as this source's own variance, channel by channel.
+    """
+
+    case: str
+    source: str
+    channels: list[str] | None = None
+    differs_from: str | None = None
+    share: Annotated[float, Field(ge=0, le=1)] = 0.5
+
+
+class Prior(Data):
+    """What is known of a multiplier or offset before any maneuver.
+
+    ``captive``: one (or no offset) within the captive error of the group. ``carry_over``: the
+    vortex-lattice factor on force or roll moment of the plane geometry. ``tail_downwash``:
+    factor on force or pitch moment of the sail planes by their vortices at the stern planes.
+    ``stated``: mean and sigma with their reason. ``sigma`` widens the others where given.
+    """
+
+    method: Literal["captive", "carry_over", "tail_downwash", "stated"]
+    mean: float | None = None
+    sigma: Positive | None = None
+    of: Literal["force", "roll", "pitch"] = "force"
+    source: str
+
+    @model_validator(mode="after")
+    def _stated_has_numbers(self) -> Prior:
+        if self.method == "stated" and (self.mean is None or self.sigma is None):
+            raise ValueError("a stated prior needs mean and sigma")
+        return self
+
+
+class Group(Data):
+    """Tabulated values that share one multiplier or offset.
+
+    ``terms`` and ``parts`` are shell patterns; ``nonzero`` lists axes whose value must not
+    be zero, such as beta for what drift adds.
+    """
+
+    name: str
+    title: str
+    terms: Annotated[list[str], Field(min_length=1)]
+    parts: list[str] = Field(default_factory=lambda: ["*"])
+    nonzero: list[str] = Field(default_factory=list)
+    kind: Literal["multiplier", "offset"] = "multiplier"
+    prior: Prior
+
+
+class CalibrationFile(Data):
+    """A calibration file."""
+
+    name: str
+    vehicle: str
+    source: str
+    training: Annotated[list[Training], Field(min_length=1)]
+    group: Annotated[list[Group], Field(min_length=1)]
+
+    @model_validator(mode="after")
+    def _names_once(self) -> CalibrationFile:
+        names = [g.name for g in self.group]
+        twice = sorted({n for n in names if names.count(n) > 1})
+        if twice:
+            raise ValueError(f"group {twice[0]!r} stands twice")
+        return self
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A group with its rows and its prior in numbers.
+
+    Attributes
+    ----------
+    group : As in the file.
+    rows : (rows,) True for the database rows of the group.
+    mean, sigma : Prior.
+    captive : Captive standard error of the group as one multiplier (or offset), all its
+        errors taken as one.
+    method : Where the prior's numbers come from.
+    """
+
+    group: Group
+    rows: Mask
+    mean: float
+    sigma: float
+    captive: float
+    method: str
+
+    @property
+    def neutral(self) -> float:
+        """The value that changes nothing."""
+        return 1.0 if self.group.kind == "multiplier" else 0.0
+
+    def beyond_captive(self, value: float) -> bool:
+        """True when the captive error alone does not allow ``value``."""
+        return abs(value - self.neutral) > ALLOWED * self.captive
+
+
+def bundled_calibrations() -> list[str]:
+    """Names of the bundled calibrations."""
+    return sorted(p.name[:-5] for p in (files("ident") / "calibrations").iterdir() if p.name.endswith(".toml"))
+
+
+def load_calibration(name: str | Path) -> tuple[CalibrationFile, str, str]:
+    """A bundled calibration or a path to one.
+
+    Returns
+    -------
+    The file, the name to report, and its SHA-256.
+
+    Raises
+    ------
+    InputError
+        For a missing file, an unknown key, or a value out of range.
+    """
+    known = bundled_calibrations()
+    inside = files("ident") / "calibrations" / f"{name}.toml"
+    path = Path(str(inside)) if str(name) in known else Path(name)
+    if path.suffix != ".toml" or not path.is_file():
+        allowed = f"one of {', '.join(known)}, or a path to a .toml file"
+        raise InputError(str(name)[:200], "no such calibration", allowed)
+    data, where = read_toml(path, "cases")
+    digest = hashlib.sha256(Path(where).read_bytes()).hexdigest()
+    return checked(CalibrationFile, data, where), where, digest
+
+
+def _rows_of(group: Group, rows: pd.DataFrame, where: str) -> Mask:
+    names, parts = rows["coefficient"].astype(str), rows["part"].astype(str)
+    chosen = np.array([any(fnmatchcase(n, t) for t in group.terms) for n in names])
+    chosen &= np.array([any(fnmatchcase(p, t) for t in group.parts) for p in parts])
+    columns = {axis: column for column, axis in axis_columns().items()}
+    for axis in group.nonzero:
+        if axis not in catalogue.axes():
+            allowed = ", ".join(catalogue.axes())
+            raise InputError(f"{where}, group {group.name}, key nonzero", repr(axis), allowed)
+        chosen &= (rows[columns[axis]].fillna(0.0) != 0.0).to_numpy()
+    if not chosen.any():
+        text = "terms and parts that the database version holds"
+        raise InputError(f"{where}, group {group.name}", f"no value matches {' '.join(group.terms)}", text)
+    return chosen
+
+
+def _whole_estimates(group: Group, rows: pd.DataFrame, chosen: Mask, where: str) -> None:
+    """A value and its mirror image are one estimate and cannot be told apart."""
+    estimate = rows["estimate"].to_numpy()
+    shared = set(estimate[chosen & (estimate >= 0)]) & set(estimate[~chosen & (estimate >= 0)])
+    if shared:
+        row = rows[(estimate == min(shared)) & ~chosen].iloc[0]
+        found = f"{row['coefficient']} of {row['part']} is left out, which is the mirror image of one inside"
+        raise InputError(f"{where}, group {group.name}", found, "a value together with its mirror image")
+
+
+def captive_sigma(rows: pd.DataFrame, chosen: Mask, kind: str) -> float:
+    """Captive standard error of a group as one multiplier or offset.
+
+    As if the group held one value only, of its mean information: all errors are taken as
+    one, and nothing averages out. Values without a stated error do not count.
+    """
+    error, value = rows["stderr"].to_numpy()[chosen], rows["value"].to_numpy()[chosen]
+    known = error > 0.0
+    size = np.abs(value[known]) if kind == "multiplier" else 1.0
+    information = float(np.mean((size / error[known]) ** 2)) if known.any() else 0.0
+    return information**-0.5 if information > 0.0 else 0.0
+
+
+def _estimated(prior: Prior, vehicle: Vehicle, rows: pd.DataFrame) -> tuple[float, float, str]:
+    """Mean, standard deviation and method of an estimate from the geometry."""
+    from ident.estimates.carry_over import carry_over
+
+    planes = carry_over(vehicle)
+    if prior.method == "carry_over":
+        if prior.of == "force":
+            return planes.force_factor, planes.force_sigma, planes.method
+        return planes.roll_factor / planes.force_factor, planes.roll_sigma / planes.force_factor, planes.method
+    from ident.estimates.downwash import tail_downwash
+
+    tail = tail_downwash(vehicle, rows, planes)
+    if prior.of == "force":
+        return tail.force_factor, tail.force_sigma, tail.method
+    return tail.moment_factor, tail.moment_sigma, tail.method
+
+
+def _prior(group: Group, captive: float, vehicle: Vehicle, rows: pd.DataFrame, where: str) -> tuple[float, float, str]:
+    prior = group.prior
+    mean, sigma, method = 1.0 if group.kind == "multiplier" else 0.0, captive, "captive standard error"
+    if prior.method == "stated":
+        mean, sigma, method = float(prior.mean or 0.0), float(prior.sigma or 0.0), "stated"
+    elif prior.method != "captive":
+        mean, spread, method = _estimated(prior, vehicle, rows)
+        sigma = float(np.hypot(spread, mean * captive))
+    if prior.sigma is not None and prior.method != "stated":
+        sigma = max(sigma, prior.sigma)
+    if sigma <= 0.0:
+        raise InputError(f"{where}, group {group.name}", "a prior without any spread", "prior.sigma, positive")
+    return mean, sigma, method
+
+
+def parameters(spec: CalibrationFile, vehicle: Vehicle, rows: pd.DataFrame, where: str) -> list[Parameter]:
+    """The groups of a calibration with their rows and priors.
+
+    Parameters
+    ----------
+    spec, where : From ``load_calibration``.
+    vehicle, rows : What is calibrated.
+
+    Raises
+    ------
+    InputError
+        For a group without rows, one that splits a value from its mirror image, or a prior
+        without spread.
+    """
+    found = []
+    for group in spec.group:
+        chosen = _rows_of(group, rows, where)
+        _whole_estimates(group, rows, chosen, where)
+        captive = captive_sigma(rows, chosen, group.kind)
+        mean, sigma, method = _prior(group, captive, vehicle, rows, where)
+        found.append(Parameter(group, chosen, mean, sigma, captive, method))
+    return found
+
+
+def apply(values: Array, chosen: list[Parameter], theta: Array) -> Array:
+    """Row values with every multiplier and offset in place.
+
+    Parameters
+    ----------
+    values : (rows,) captive values.
+    chosen : The parameters, (k,).
+    theta : (k,) multipliers and offsets.
+    """
+    out = values.copy()
+    for parameter, x in zip(chosen, theta, strict=True):
+        if parameter.group.kind == "multiplier":
+            out[parameter.rows] *= x
+    for parameter, x in zip(chosen, theta, strict=True):
+        if parameter.group.kind == "offset":
+            # Mirror images carry the sign of their value.
+            out[parameter.rows] += x * np.where(values[parameter.rows] < 0.0, -1.0, 1.0)
+    return out

@@ -1,0 +1,341 @@
+"""A calibration from a database version to the next: diagnostics, rows, metadata, tables."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from ident.calibration.estimate import Channel, Estimate, Problem, calibrate, contradictions, problem
+from ident.calibration.file import Parameter, apply, load_calibration, parameters
+from ident.database.store import commit, correlation_texts, digest
+from ident.validation.bands import covariance
+from sim.boat.database import NUMBERS, Version, column_order, own_version, read_rows, versions
+from sim.boat.vehicle import load_vehicle
+from sim.files.errors import InputError
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+Array = NDArray[np.float64]
+
+# Two multipliers whose posterior correlation is beyond this cannot be told apart.
+_ALIKE = 0.9
+# A multiplier whose posterior is this close to its prior was not learnt.
+_UNLEARNT = 0.9
+# A multiplier that moves by more of its standard deviations without one source is said.
+_SHIFTED = 2.0
+
+
+@dataclass(frozen=True)
+class Calibrated:
+    """One calibration, committed.
+
+    Attributes
+    ----------
+    summary : What a machine reads, and what the version's metadata holds.
+    version, new, digest : As of a fit.
+    """
+
+    summary: dict[str, Any]
+    version: int
+    new: bool
+    digest: str
+
+
+def captive_version(db: str, vehicle: str, number: int | None) -> Version:
+    """The version to start from: the one asked for, or the latest that no maneuver trained.
+
+    Raises
+    ------
+    InputError
+        When there is none, or the one asked for is itself calibrated.
+    """
+    if number is not None:
+        found = own_version(db, vehicle, number)
+        if json.loads(found.metadata.get("trained", "[]")):
+            raise InputError(
+                f"{db}, version {number}", "a calibrated version", "a captive-only one; see `ident versions`"
+            )
+        return found
+    for version in reversed(versions(db)):
+        own = version.metadata.get("vehicle", vehicle) == vehicle
+        if own and not json.loads(version.metadata.get("trained", "[]")):
+            return version
+    raise InputError(db, f"no captive version of {vehicle}", "a version written by `ident fit`")
+
+
+def from_data(parameter: Parameter, value: float, sigma: float) -> tuple[float, float] | None:
+    """What the maneuvers alone say of one multiplier, its prior taken out of the posterior.
+
+    Returns
+    -------
+    Value and standard deviation, or None when the maneuvers say next to nothing.
+    """
+    gained = 1.0 / sigma**2 - 1.0 / parameter.sigma**2
+    if sigma > _UNLEARNT * parameter.sigma or gained <= 0.0:
+        return None
+    alone = (value / sigma**2 - parameter.mean / parameter.sigma**2) / gained
+    return float(alone), float(gained**-0.5)
+
+
+def _group(parameter: Parameter, value: float, sigma: float) -> dict[str, Any]:
+    prior = parameter.group.prior
+    alone = from_data(parameter, value, sigma)
+    away = None
+    if alone is not None:
+        away = abs(alone[0] - parameter.mean) / float(np.hypot(alone[1], parameter.sigma))
+    return {
+        "name": parameter.group.name,
+        "title": parameter.group.title,
+        "kind": parameter.group.kind,
+        "terms": parameter.group.terms,
+        "values": int(parameter.rows.sum()),
+        "prior": {
+            "mean": parameter.mean,
+            "sigma": parameter.sigma,
+            "method": parameter.method,
+            "estimate": prior.method not in ("captive", "stated"),
+            "source": prior.source,
+        },
+        "captive_sigma": parameter.captive,
+        "posterior": {"value": value, "sigma": sigma},
+        "maneuvers_alone": None if alone is None else {"value": alone[0], "sigma": alone[1]},
+        "away_from_prior": away,
+        "beyond_captive": parameter.beyond_captive(value),
+    }
+
+
+def _identifiability(task: Problem, estimate: Estimate) -> list[str]:
+    """Which multipliers the maneuvers cannot tell apart, and which they say nothing of."""
+    names = [p.group.name for p in task.chosen]
+    scale = np.outer(estimate.deviation, estimate.deviation)
+    correlation = estimate.covariance / scale
+    said = [
+        f"{names[i]} and {names[j]} cannot be told apart: posterior correlation {correlation[i, j]:+.2f}"
+        for i in range(len(names))
+        for j in range(i)
+        if abs(correlation[i, j]) > _ALIKE
+    ]
+    for name, parameter, sigma in zip(names, task.chosen, estimate.deviation, strict=True):
+        if sigma > _UNLEARNT * parameter.sigma:
+            said.append(f"{name}: the maneuvers say next to nothing of it; it stays at its prior")
+    return said
+
+
+def _left_out(task: Problem, whole: Estimate, workers: int | None, each: Callable[[str], None]) -> list[dict[str, Any]]:
+    """The calibration repeated without each source of each case, and what it then predicts."""
+    found = []
+    for out in dict.fromkeys(c.key[:2] for c in task.channels):
+
+        def dropped(channel: Channel, out: tuple[str, str] = out) -> bool:
+            return channel.key[:2] == out
+
+        rest = task.without(dropped)
+        if not rest.channels:
+            continue
+        each(f"without {out[0]} {out[1]}")
+        estimate = calibrate(rest, workers, lambda text: None, whole.theta)
+        residuals = task.residuals(estimate.theta)
+        predicted = {
+            c.key[2]: float(np.sqrt(np.mean(r**2))) for c, r in zip(task.channels, residuals, strict=True) if dropped(c)
+        }
+        shift = (estimate.theta - whole.theta) / np.maximum(estimate.deviation, whole.deviation)
+        found.append(
+            {
+                "case": out[0],
+                "source": out[1],
+                "value": [float(x) for x in estimate.theta],
+                "sigma": [float(x) for x in estimate.deviation],
+                "shift_in_sigma": [float(x) for x in shift],
+                "rmse_predicted": predicted,
+                "rmse_trained": {k[2]: v for k, v in whole.rms.items() if k[:2] == out},
+            }
+        )
+    return found
+
+
+def _shifts(task: Problem, left_out: list[dict[str, Any]]) -> list[str]:
+    said = []
+    for one in left_out:
+        for parameter, shift in zip(task.chosen, one["shift_in_sigma"], strict=True):
+            if abs(shift) > _SHIFTED:
+                text = f"{parameter.group.name} moves by {abs(shift):.1f} standard deviations without"
+                said.append(f"contradictory data: {text} {one['case']} {one['source']}")
+    return said
+
+
+def calibrated_rows(rows: pd.DataFrame, chosen: list[Parameter], estimate: Estimate) -> pd.DataFrame:
+    """Database rows with the multipliers in force and the posterior in their errors.
+
+    The captive error of a value stays, scaled; the error of its multiplier is added, and
+    is shared by all values of a group (column ``correlation``).
+    """
+    out = rows.copy()
+    out["value"] = apply(rows["value"].to_numpy(), chosen, estimate.theta)
+    first, matrix = covariance(rows)
+    value, error = first["value"].to_numpy(), first["stderr"].to_numpy()
+    place = first["estimate"].to_numpy()
+    first_row = {int(e): i for i, e in reversed(list(enumerate(rows["estimate"])))}
+    at = np.array([first_row[int(e)] for e in place])
+    inside = np.stack([p.rows[at] for p in chosen], axis=1)
+    multiplies = np.array([p.group.kind == "multiplier" for p in chosen])
+    factor = np.prod(np.where(inside & multiplies, estimate.theta, 1.0), axis=1)
+    side = np.where(value < 0.0, -1.0, 1.0)
+    slope = np.where(multiplies, (value * factor)[:, None] / estimate.theta, side[:, None]) * inside
+    total = np.outer(factor * error, factor * error) * matrix + slope @ estimate.covariance @ slope.T
+    deviation = np.sqrt(np.diag(total))
+    text = correlation_texts(total, deviation)
+    index = {int(e): i for i, e in enumerate(place)}
+    known = rows["estimate"].to_numpy() >= 0
+    where = np.array([index.get(int(e), -1) for e in rows["estimate"]])
+    out.loc[known, "stderr"] = deviation[where[known]]
+    named = {i: " ".join(f"{place[int(a)]}:{b}" for a, b in (t.split(":") for t in x.split())) for i, x in text.items()}
+    out["correlation"] = [named.get(int(i), "") if i >= 0 else "" for i in where]
+    out["calibration"] = [
+        " ".join(f"{p.group.name}={x:.4g}" for p, x in zip(chosen, estimate.theta, strict=True) if p.rows[i])
+        for i in range(len(rows))
+    ]
+    for column in NUMBERS:
+        out[column] = [float(f"{x:.12g}") for x in out[column]]
+    return out[column_order()]
+
+
+def _rounded(estimate: Estimate) -> Estimate:
+    """Four digits: far below any posterior error, and the same on another machine."""
+    return replace(
+        estimate,
+        theta=np.array([float(f"{x:.4g}") for x in estimate.theta]),
+        covariance=np.array([[float(f"{x:.4g}") for x in row] for row in estimate.covariance]),
+    )
+
+
+def run(
+    name: str,
+    db: str,
+    version: int | None = None,
+    message: str = "",
+    left_out: bool = True,
+    workers: int | None = None,
+    each: Callable[[str], None] = lambda text: None,
+) -> Calibrated:
+    """Calibrate a captive version and commit the result.
+
+    Parameters
+    ----------
+    name : Bundled calibration or path to one.
+    db, version : Database and captive version; the latest captive one when None.
+    message : Stored with the version.
+    left_out : Also calibrate without each source in turn.
+    workers : Threads; the result does not depend on it.
+    each : Called with a line of text as the work goes on.
+
+    Raises
+    ------
+    InputError
+        For a calibration, case, reference, database or version that does not exist or fit.
+    """
+    spec, where, own = load_calibration(name)
+    vehicle = load_vehicle(spec.vehicle, beside=where)
+    base = captive_version(db, vehicle.name, version)
+    rows, _ = read_rows(db, base.number, vehicle.name)
+    chosen = parameters(spec, vehicle, rows, where)
+    task = problem(spec, where, vehicle, rows, chosen)
+    estimate = calibrate(task, workers, each)
+    estimate = _rounded(estimate)
+    theta, sigma = [float(x) for x in estimate.theta], [float(x) for x in estimate.deviation]
+    without = _left_out(task, estimate, workers, each) if left_out else []
+    warnings = contradictions(task) + _shifts(task, without) + _identifiability(task, estimate)
+    if not estimate.converged:
+        warnings.insert(0, f"not converged after {estimate.rounds} rounds")
+    summary = {
+        "calibration": spec.name,
+        "vehicle": vehicle.name,
+        "parent": base.number,
+        "parent_digest": base.digest,
+        "source": spec.source,
+        "file_digest": own,
+        "trained": list(dict.fromkeys(f"{c.key[0]}:{c.key[1]}" for c in task.channels)),
+        "groups": [_group(p, x, s) for p, x, s in zip(chosen, theta, sigma, strict=True)],
+        "covariance": estimate.covariance.tolist(),
+        "series": [
+            {
+                "case": k[0],
+                "source": k[1],
+                "channel": k[2],
+                "rmse": float(f"{v:.4g}"),
+                "sigma": float(f"{estimate.sigma[k]:.4g}"),
+            }
+            for k, v in estimate.rms.items()
+        ],
+        "left_out": without,
+        "warnings": warnings,
+    }
+    done = calibrated_rows(rows, chosen, estimate)
+    kept = {
+        k: v for k, v in base.metadata.items() if k in ("campaign", "facility", "provenance", "frame", "inputs", *_FIT)
+    }
+    trained = list(dict.fromkeys(c.key[0] for c in task.channels))
+    metadata = {
+        **kept,
+        "parent": str(base.number),
+        "trained": json.dumps(trained),
+        "calibration": json.dumps(summary),
+        "message": message,
+    }
+    number, new = commit(db, done, metadata)
+    return Calibrated(summary, number, new, digest(done))
+
+
+_FIT = ("conversions", "options", "unused", "warnings", "quality", "checks")
+
+
+def show(done: Calibrated, console: Console) -> None:
+    """Print priors and posteriors, the series, what was left out, and what to beware of."""
+    from rich.markup import escape
+    from rich.table import Table
+
+    summary = done.summary
+    table = Table("group", "prior", "captive error", "posterior", "maneuvers alone", "verdict")
+    table.title = f"{summary['calibration']}: multipliers on version {summary['parent']}"
+    for g in summary["groups"]:
+        alone, prior, after = g["maneuvers_alone"], g["prior"], g["posterior"]
+        colour = "red" if g["beyond_captive"] else "green"
+        table.add_row(
+            g["name"],
+            f"{prior['mean']:.2f} ± {prior['sigma']:.2f}",
+            f"± {g['captive_sigma']:.2f}",
+            f"[{colour}]{after['value']:.3f} ± {after['sigma']:.3f}[/]",
+            "-" if alone is None else f"{alone['value']:.2f} ± {alone['sigma']:.2f}",
+            verdict(g),
+        )
+    console.print(table)
+    table = Table("case", "source", "channel", "RMSE", "sigma", title="Training series, units of the references")
+    for s in summary["series"]:
+        table.add_row(s["case"], s["source"], s["channel"], f"{s['rmse']:.4g}", f"{s['sigma']:.4g}")
+    console.print(table)
+    for one in summary["left_out"]:
+        errors = ", ".join(
+            f"{k} {v:.3g} ({one['rmse_trained'][k]:.3g} trained)" for k, v in one["rmse_predicted"].items()
+        )
+        console.print(f"left out {one['case']} {one['source']}, predicted RMSE: {errors}", highlight=False)
+    for text in summary["warnings"]:
+        console.print(f"[yellow]warning[/] {escape(text)}", highlight=False)
+    state = "committed" if done.new else "unchanged, nothing committed: already"
+    console.print(f"[bold]{state} version {done.version}[/]  digest {done.digest[:16]}", highlight=False)
+
+
+def verdict(group: dict[str, Any]) -> str:
+    """What a posterior says: of an estimate, whether it agrees; of the captive error, whether it allows it."""
+    words = []
+    if group["prior"]["estimate"] and group["away_from_prior"] is not None:
+        away = group["away_from_prior"]
+        words.append(f"{'agrees' if away < 2.0 else 'disagrees'} with the estimate ({away:.1f} sigma)")
+    if group["beyond_captive"]:
+        words.append("captive error alone does not allow it")
+    return "; ".join(words) or "within the captive error"

@@ -1,0 +1,289 @@
+"""Read a captive campaign: schema check, units, frame, moment point, scale, errors.
+
+A campaign is a folder with ``campaign.toml`` and run files: one CSV a test, or whatever
+``[[source]]`` names (see ``docs/readers.md``). It leaves here as one table of runs in the
+program frame, SI and radians, with a standard error for every load.
+"""
+
+from __future__ import annotations
+
+import glob
+import hashlib
+from dataclasses import dataclass, field
+from functools import cache
+from importlib.resources import files
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from ident.captive import published
+from ident.captive.campaign_file import CampaignFile, read_header
+from ident.captive.conversions import (
+    DIRECT,
+    MOTION,
+    move_moments,
+    standard_errors,
+    to_full_scale,
+    turn,
+    whole_model,
+    without_inertia,
+    without_tare,
+)
+from ident.captive.histories import NotRising, Reduced
+from ident.captive.readers.opening import inputs
+from ident.captive.runs import TEXT, Found, source_runs
+from ident.captive.source import Source
+from ident.checks.findings import run_table
+from sim.boat.catalogue import OUTPUTS
+from sim.boat.vehicle import Vehicle, load_vehicle
+from sim.files.errors import InputError
+from sim.files.frames import Frame
+
+__all__ = ["DIRECT", "MOTION", "TEXT", "Campaign", "CampaignFile", "find_campaigns", "read_campaign", "tests"]
+
+# Further files that one message names.
+_SHOWN = 20
+# Columns every run table has, blank where no file gives them.
+_COLUMNS = ("U", "alpha", "beta", "D0", "plane", "n", "J", "rel_sigma", *MOTION, *OUTPUTS, *DIRECT)
+
+
+@dataclass(frozen=True)
+class Campaign:
+    """A campaign turned to the program frame.
+
+    Attributes
+    ----------
+    header : The checked ``campaign.toml``.
+    vehicle : The vehicle the runs belong to.
+    runs : One row a run; columns U, alpha, beta, D0, p..r, accelerations, plane, n, J in
+        SI and radians, X..N [N, N m] about the vehicle's origin, s_X..s_N standard errors,
+        KT KQ t with s_KT.., ``value`` of a published ``coefficient``, and the text columns
+        plus ``file``, ``row`` and ``reduction``.
+    digests : SHA-256 of every input file.
+    reduced : The time histories that were reduced to runs, for their plots.
+    refused : Those that were left out because their time stamps do not rise.
+    """
+
+    header: CampaignFile
+    vehicle: Vehicle
+    runs: pd.DataFrame
+    digests: dict[str, str] = field(default_factory=dict)
+    reduced: tuple[Reduced, ...] = ()
+    refused: tuple[NotRising, ...] = ()
+
+
+@cache
+def tests() -> pd.DataFrame:
+    """Known captive tests by name: stage, required quantities, meaning."""
+    with (files("ident") / "data" / "tests.csv").open(encoding="utf-8") as stream:
+        return pd.read_csv(stream).set_index("test")
+
+
+def _digest(path: Path) -> str:
+    try:
+        with path.open("rb") as stream:
+            return hashlib.file_digest(stream, "sha256").hexdigest()
+    except OSError as error:
+        raise InputError(str(path), f"cannot be read: {error.strerror}", "a readable file") from error
+
+
+def _sources(folder: Path, header: CampaignFile) -> list[Source]:
+    """The sources a campaign declares, else one CSV or Parquet file a test beside it."""
+    if header.source:
+        return header.source
+    beside = header.tables.given().values()
+    names = [sorted(p.name for p in folder.glob(kind) if p.name not in beside) for kind in ("*.csv", "*.parquet")]
+    found = [Source(files=glob.escape(name)) for kind in names for name in kind]
+    if not found:
+        raise InputError(str(folder), "no CSV file of runs", "one CSV a test beside campaign.toml, or [[source]]")
+    return found
+
+
+def _check_words(folder: Path, runs: pd.DataFrame, allowed: dict[str, list[str]]) -> None:
+    for column, words in allowed.items():
+        bad = ~runs[column].isin(words)
+        if bad.any():
+            run = runs[bad].iloc[0]
+            place = f"{folder / run['file']}, row {run['row']}, column {column}"
+            raise InputError(place, repr(run[column]), ", ".join(words))
+
+
+def read_runs(folder: Path, header: CampaignFile, vehicle: Vehicle) -> tuple[pd.DataFrame, Found]:
+    """The checked runs of every source, in SI and radians but still in the campaign's frame.
+
+    Parameters
+    ----------
+    folder : The campaign's.
+    header, vehicle : For the sources, the quality vocabulary and the names of the parts.
+
+    Returns
+    -------
+    runs : Those that could be read, in one table.
+    found : The histories that were reduced or refused, and the files that were read.
+
+    Raises
+    ------
+    InputError
+        Naming file, row, column, what was found and what is allowed.
+    """
+    found = Found()
+    words = {"test": list(tests().index), "part": vehicle.part_names(), "quality": list(header.quality)}
+    for source in _sources(folder, header):
+        for table in source_runs(folder, source, header, found):
+            _check_words(folder, table, {**words, "decoupled": ["", "True", "False"]})
+            _check_complete(folder, table)
+    runs = pd.concat(found.tables, ignore_index=True) if found.tables else pd.DataFrame()
+    for column in _COLUMNS:
+        if column not in runs:
+            runs[column] = np.nan
+    return runs, found
+
+
+def _refuse(refused: list[NotRising]) -> None:
+    """One message on every history whose time stamps do not rise."""
+    if not refused:
+        return
+    first, more = refused[0], refused[1:]
+    rest = "; ".join(f"{one.file}, data row {one.row}: {one.found}" for one in more[:_SHOWN])
+    rest = f"; and in {len(more)} more: {rest}" if more else ""
+    rest += f"; ... {len(more) - _SHOWN} more, see ident check" if len(more) > _SHOWN else ""
+    raise InputError(first.where, first.found + rest, first.allowed)
+
+
+def _check_complete(folder: Path, runs: pd.DataFrame) -> None:
+    """Every run has what its test needs, a load or coefficient, and an error to go with it."""
+    for _, run in runs.iterrows():
+        place = f"{folder / run['file']}, row {run['row']}"
+        for need in str(tests().loc[run["test"], "requires"]).split():
+            quantity = "plane" if need == "delta" else need
+            if pd.isna(run.get(quantity, np.nan)):
+                raise InputError(f"{place}, column {quantity}", "nothing", f"a number: a {run['test']} run needs it")
+        if not run["run_id"]:
+            raise InputError(f"{place}, column run_id", "nothing", "a name for the run")
+        if run.get("U", np.nan) < 0:
+            text = "zero or more: U is a speed, its direction is in alpha and beta"
+            raise InputError(f"{place}, column U", str(run["U"]), text)
+        measured = [o for o in (*OUTPUTS, *DIRECT) if pd.notna(run.get(o, np.nan))]
+        if not measured:
+            raise InputError(place, "no load and no coefficient", "at least one of X Y Z K M N, KT KQ, t, value")
+        wrong = [w for w in run["exclude"].split() if w not in (*OUTPUTS, *DIRECT)]
+        if wrong:
+            raise InputError(f"{place}, column exclude", repr(wrong[0]), ", ".join((*OUTPUTS, *DIRECT)))
+        relative = run.get("rel_sigma", np.nan)
+        if pd.isna(relative):
+            bare = [o for o in measured if pd.isna(run.get(f"s_{o}", np.nan))]
+            if bare:
+                raise InputError(f"{place}, column rel_sigma", "nothing", f"a number, or sigma_{bare[0]}_<unit>")
+
+
+def read_campaign(folder: Path, leave_out: bool = False) -> Campaign:
+    """Read and turn one campaign.
+
+    Parameters
+    ----------
+    folder : Folder with ``campaign.toml`` and the files of runs.
+    leave_out : Leave histories whose time stamps do not rise to the quality checks, instead of
+        refusing them all in one message.
+
+    Returns
+    -------
+    Campaign in the program frame, full scale, moments about the vehicle's origin.
+
+    Raises
+    ------
+    InputError
+        For anything a user can mend: missing file or column, unknown test, unit, part or
+        quality word, text or a non-finite number, a frame that is not declared.
+    """
+    header, raw = read_header(folder)
+    where = str(folder / "campaign.toml")
+    vehicle = load_vehicle(header.vehicle, beside=folder / "campaign.toml")
+    frame = header.frame.declared(f"{where}, [frame]")
+    _check_named(header, vehicle, where)
+    runs, found = read_runs(folder, header, vehicle)
+    if not leave_out:
+        _refuse(found.refused)
+    digests = {"campaign.toml": hashlib.sha256(raw).hexdigest()}
+    for path in sorted({f for p in found.inputs for f in inputs(p)}):
+        digests[path.relative_to(folder).as_posix()] = _digest(path)
+    histories = (tuple(found.reduced), tuple(found.refused))
+    if runs.empty:
+        return Campaign(header, vehicle, run_table({}), digests, *histories)
+    runs["copy_of"] = _originals(folder, runs)
+    point = frame.vector([header.moment_point.x_m, header.moment_point.y_m, header.moment_point.z_m])
+    length = header.scale.ratio * header.scale.length_m
+    runs = published.to_program(runs, vehicle, frame, length, point, str(folder))
+    runs = _in_program_frame(runs, header, frame, where)
+    bad = (
+        ~np.isfinite(runs[[*OUTPUTS, *(f"s_{o}" for o in OUTPUTS)]])
+        & runs[[*OUTPUTS, *(f"s_{o}" for o in OUTPUTS)]].notna()
+    )
+    if bad.any(axis=None):
+        run = runs[bad.any(axis=1)].iloc[0]
+        place = f"{folder / run['file']}, row {run['row']}"
+        raise InputError(place, "a load that is not finite at full scale", "smaller numbers")
+    return Campaign(header, vehicle, runs, digests, *histories)
+
+
+def _check_named(header: CampaignFile, vehicle: Vehicle, where: str) -> None:
+    """Tests and parts that ``[inertia]`` and ``[[tare]]`` name exist: a slip would take nothing off."""
+    known = {"tests": list(tests().index), "parts": vehicle.part_names()}
+    named = [("inertia", "parts", header.inertia.parts if header.inertia.model_inertia_in_loads else [])]
+    named += [(f"tare.{k}", key, getattr(tare, key)) for k, tare in enumerate(header.tare) for key in known]
+    for table, key, words in named:
+        for word in words:
+            if word not in known[key]:
+                raise InputError(f"{where}, key {table}.{key}", repr(word), ", ".join(known[key]))
+
+
+def _in_program_frame(runs: pd.DataFrame, header: CampaignFile, frame: Frame, where: str) -> pd.DataFrame:
+    """Every conversion, in the order of ``ident.captive.conversions``."""
+    ratio, point = header.scale.ratio, header.moment_point
+    runs = turn(without_tare(runs, header.tare, where), frame, header.frame.angles)
+    runs = move_moments(runs, frame.vector([point.x_m, point.y_m, point.z_m]))
+    runs = whole_model(without_inertia(runs, header, frame), header)
+    return standard_errors(to_full_scale(runs, ratio), header, ratio * header.scale.length_m)
+
+
+def _originals(folder: Path, runs: pd.DataFrame) -> pd.Series:
+    """The run each copy goes back to, through copies of copies; empty for originals."""
+    repeated = runs[runs["run_id"].duplicated()]
+    if not repeated.empty:
+        run = repeated.iloc[0]
+        place = f"{folder / run['file']}, row {run['row']}, column run_id"
+        text = "each run_id once a campaign; match = '(?P<run_id>...)' in [[source]] takes it from the path"
+        raise InputError(place, repr(run["run_id"]), text)
+    parent = dict(zip(runs["run_id"], runs["copy_of"], strict=True))
+
+    def origin(run: pd.Series) -> str:
+        seen, at = {run["run_id"]}, run["copy_of"]
+        while at:
+            if at not in parent or at in seen:
+                place = f"{folder / run['file']}, row {run['row']}, column copy_of"
+                raise InputError(place, repr(run["copy_of"]), "the run_id of another run, without a circle")
+            seen.add(at)
+            if not parent[at]:
+                return str(at)
+            at = parent[at]
+        return ""
+
+    return runs.apply(origin, axis=1)
+
+
+def find_campaigns(folder: Path) -> list[Path]:
+    """The campaign folders at or directly below ``folder``.
+
+    Raises
+    ------
+    InputError
+        When there is none.
+    """
+    if not folder.is_dir():
+        raise InputError(str(folder), "not a folder", "a folder with campaign.toml, or one that holds such folders")
+    if (folder / "campaign.toml").is_file():
+        return [folder]
+    found = sorted(p.parent for p in folder.glob("*/campaign.toml"))
+    if not found:
+        raise InputError(str(folder), "no campaign.toml here or one level below", "a campaign folder")
+    return found

@@ -1,0 +1,222 @@
+"""The schema of ``campaign.toml``."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import Field, field_validator, model_validator
+
+from ident.captive.source import Source, Vector
+from sim.boat.catalogue import OUTPUTS
+from sim.files.errors import InputError
+from sim.files.frames import Frame, FrameError
+from sim.files.schema import Data, FrameData, checked
+
+
+class CampaignFrame(FrameData):
+    """Axis directions of the loads and rates, sense of rotation, sign convention of the angles.
+
+    Attributes
+    ----------
+    angles : ``flight``: beta = asin(v/U), positive with starboard windward. ``ittc``: the
+        ship's drift angle, positive with port windward.
+    rotations : Sense of moments and rates about their axis, ``right-hand`` or ``left-hand``
+        (N = x Y - y X in left-handed axes). A left-handed set has to state it.
+    """
+
+    angles: Literal["flight", "ittc"]
+    rotations: Literal["", "right-hand", "left-hand"] = ""
+
+    @property
+    def frame(self) -> Frame:
+        """The declared frame. Raises ``FrameError`` when it is not one."""
+        return Frame(self.x, self.y, self.z, self.rotations)
+
+    def declared(self, where: str) -> Frame:
+        """The declared frame. Raises ``InputError`` naming ``where`` when it is not one."""
+        try:
+            return self.frame
+        except FrameError as error:
+            text = 'right-handed axes; or left-handed ones with rotations = "left-hand" (N = x Y - y X) or "right-hand"'
+            raise InputError(where, str(error), text) from error
+
+
+class MomentPoint(Data):
+    """Point the moments are about, from the vehicle's origin, in the campaign frame."""
+
+    x_m: float
+    y_m: float
+    z_m: float
+    about: str
+
+
+class Scale(Data):
+    """Linear scale ratio (ship over model); length, and draught where one is needed, of the tested body."""
+
+    ratio: Annotated[float, Field(gt=0, le=1e4)]
+    length_m: Annotated[float, Field(gt=0, le=1e4)]
+    draught_m: Annotated[float, Field(gt=0, le=1e4)] | None = None
+
+
+class Fluid(Data):
+    """Water density of the tests."""
+
+    density_kgpm3: Annotated[float, Field(gt=0, le=1e5)]
+    source: str
+
+
+class Inertia(Data):
+    """Whether the loads contain the model's own inertia, and then what it is.
+
+    Attributes
+    ----------
+    model_inertia_in_loads : When true, the measured load is water minus m a, and m a is
+        added back: mass, centre of gravity and tensor have to be given.
+    mass_kg : Mass of everything that the balance carries.
+    centre_of_gravity_m : From the vehicle's origin, campaign frame, model scale.
+    tensor_kgm2 : Ixx, Iyy, Izz, and products Ixy, Iyz, Izx (integral of xy dm) where there
+        are any, about the centre of gravity.
+    parts : Parts whose loads contain it.
+    source : Where the numbers come from.
+    """
+
+    model_inertia_in_loads: bool
+    mass_kg: Annotated[float, Field(gt=0, le=1e10)] | None = None
+    centre_of_gravity_m: Vector | None = None
+    tensor_kgm2: Annotated[list[float], Field(min_length=3, max_length=6)] | None = None
+    parts: list[str] = Field(default_factory=lambda: ["hull"])
+    source: str = ""
+
+    @model_validator(mode="after")
+    def _all_or_nothing(self) -> Inertia:
+        given = [k for k in ("mass_kg", "centre_of_gravity_m", "tensor_kgm2") if getattr(self, k) is not None]
+        if self.model_inertia_in_loads and len(given) < 3:
+            raise ValueError("with model_inertia_in_loads = true: mass_kg, centre_of_gravity_m and tensor_kgm2")
+        if not self.model_inertia_in_loads and given:
+            raise ValueError(f"no {given[0]}: model_inertia_in_loads is false, so nothing is taken off")
+        if self.tensor_kgm2 is not None and len(self.tensor_kgm2) not in (3, 6):
+            raise ValueError("three moments of inertia, or three and three products")
+        return self
+
+
+class Tare(Data):
+    """Loads that are not the water's on the model: zero readings, struts, wind, wires.
+
+    Attributes
+    ----------
+    what : Strut, zero reading, ...
+    loads : Component -> load with its unit, subtracted: ``X = "1.2 N"``.
+    per_speed_squared : Component -> load [N or N m] for every (m/s)^2 of U^2, subtracted.
+    tests, parts : Runs it applies to; all when empty.
+    source : Where the numbers come from.
+    """
+
+    what: str
+    source: str
+    loads: dict[str, str] = Field(default_factory=dict)
+    per_speed_squared: dict[str, float] = Field(default_factory=dict)
+    tests: list[str] = Field(default_factory=list)
+    parts: list[str] = Field(default_factory=list)
+
+    @field_validator("loads", "per_speed_squared")
+    @classmethod
+    def _components(cls, given: dict[str, object]) -> dict[str, object]:
+        for name in given:
+            if name not in OUTPUTS:
+                raise ValueError(f"components {' '.join(OUTPUTS)}, not {name}")
+        return given
+
+
+class HalfModel(Data):
+    """Only half of the body was tested, against its plane of symmetry.
+
+    Attributes
+    ----------
+    plane : ``port_starboard``: X, Z, M are doubled; the others are zero by symmetry and
+        left out. ``upper_lower`` (a double body): X, Y, N are doubled.
+    source : Where this is said.
+    """
+
+    plane: Literal["port_starboard", "upper_lower"]
+    source: str
+
+
+class Uncertainty(Data):
+    """Rule for the standard error of a load."""
+
+    floor: Annotated[float, Field(ge=0, le=1)]
+    source: str
+
+
+class Quality(Data):
+    """A word of the quality vocabulary: factor on the standard error, and its meaning."""
+
+    factor: Annotated[float, Field(ge=1, le=1e6)]
+    meaning: str
+
+
+class Tables(Data):
+    """Tables beside the runs that the quality checks look at.
+
+    Attributes
+    ----------
+    configurations : CSV with columns configuration and appendages: what each name of a
+        configuration in the source stands for.
+    reference : CSV with columns coefficient and value: derivatives of the same body printed
+        elsewhere, program frame, over 1/2 rho L^n.
+    """
+
+    configurations: str = ""
+    reference: str = ""
+
+    @field_validator("configurations", "reference")
+    @classmethod
+    def _beside(cls, name: str) -> str:
+        if name and (Path(name).name != name or len(name) > 200):
+            raise ValueError("the name of a file in the campaign folder")
+        return name
+
+    def given(self) -> dict[str, str]:
+        """Those that are named."""
+        return {k: v for k, v in self.model_dump().items() if v}
+
+
+class CampaignFile(Data):
+    """Schema of ``campaign.toml``."""
+
+    name: str
+    vehicle: str
+    facility: str
+    provenance: str
+    frame: CampaignFrame
+    moment_point: MomentPoint
+    scale: Scale
+    fluid: Fluid
+    inertia: Inertia
+    uncertainty: Uncertainty
+    quality: dict[str, Quality]
+    tare: list[Tare] = Field(default_factory=list)
+    half_model: HalfModel | None = None
+    tables: Tables = Field(default_factory=Tables)
+    source: list[Source] = Field(default_factory=list)
+
+
+def read_header(folder: Path) -> tuple[CampaignFile, bytes]:
+    """The checked ``campaign.toml`` of a folder, and its bytes.
+
+    Raises
+    ------
+    InputError
+        For a missing file, one that is not TOML, or a key missing, unknown or out of range.
+    """
+    path = folder / "campaign.toml"
+    if not path.is_file():
+        raise InputError(str(path), "missing", "a campaign folder holds campaign.toml and one CSV a test")
+    raw = path.read_bytes()
+    try:
+        data = tomllib.loads(raw.decode("utf-8"))
+    except (ValueError, RecursionError) as error:
+        raise InputError(str(path), f"not TOML: {error}", "a TOML file in UTF-8") from error
+    return checked(CampaignFile, data, str(path)), raw

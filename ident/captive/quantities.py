@@ -1,0 +1,249 @@
+"""What a column of a run table or time history is: a quantity, its unit, its factor to SI.
+
+``data/quantities.csv`` lists the quantities with their suffix units (``U_kts``, ``X_kN``);
+a unit in brackets, ``X [lbf]`` or ``X (kgf)``, is read by the ``pint`` library and has to
+have the dimension of the quantity.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
+from typing import Any
+
+import pandas as pd
+
+from sim.boat.catalogue import OUTPUTS
+from sim.files.errors import InputError
+
+# A load, its standard error, and what an oscillatory test is reduced to: mean, then in
+# phase and in quadrature with the displacement, first to third harmonic.
+HARMONICS = ("mean", "in", "out", "in2", "out2", "in3", "out3")
+# Before a load: what ``[[source.subtract]]`` took off it.
+TAKEN = "taken_"
+# Dimensionless input needs a named normalisation for these.
+PRIMED = {
+    **dict.fromkeys(("X", "Y", "Z"), "force"),
+    **dict.fromkeys(("K", "M", "N"), "moment"),
+    **dict.fromkeys(("p", "q", "r"), "rate"),
+    **dict.fromkeys(("udot", "vdot", "wdot"), "acceleration"),
+    **dict.fromkeys(("pdot", "qdot", "rdot"), "rotation"),
+}
+_BRACKET = re.compile(r"^(?P<name>.*?)\s*(?:\[(?P<square>[^\[\]]*)\]|\((?P<round>[^()]*)\))$", re.DOTALL)
+_PART = re.compile(r"([A-Za-zµ]+)(?:(?:\*\*|\^)?(-?[1-4]))?")
+_RAISED = str.maketrans("⁻¹²³⁴", "-1234")
+_ANGLES = {"radian", "degree", "turn", "grade", "arcminute", "arcsecond", "milliradian"}
+_NO_UNIT = ("", "-", "1", "/")
+
+
+@dataclass(frozen=True)
+class Column:
+    """What a column holds.
+
+    Attributes
+    ----------
+    name : The header as it stands in the file.
+    quantity : Name in the run table: ``U``, ``X``, ``s_X``, ``X_in``, ...
+    factor : Factor to SI (rad, rev/s); 1 for dimensionless input.
+    primed : True for a dimensionless load, rate or acceleration.
+    """
+
+    name: str
+    quantity: str
+    factor: float
+    primed: bool = False
+
+
+@cache
+def table() -> pd.DataFrame:
+    """The quantities: one row a quantity and unit."""
+    with (files("ident") / "data" / "quantities.csv").open(encoding="utf-8") as stream:
+        return pd.read_csv(stream, keep_default_na=False)
+
+
+@cache
+def units() -> dict[str, dict[str, float]]:
+    """Quantity -> suffix unit -> factor to SI."""
+    known: dict[str, dict[str, float]] = {}
+    for q, unit, factor in zip(table()["quantity"], table()["unit"], table()["factor"], strict=True):
+        known.setdefault(str(q), {})[str(unit)] = float(factor)
+    return known
+
+
+@cache
+def _spelled() -> dict[str, str]:
+    """Quantity -> its SI unit as pint spells it."""
+    rows = table()[table()["spelled"] != ""]
+    return dict(zip(rows["quantity"], rows["spelled"], strict=True))
+
+
+@cache
+def suffixed() -> dict[str, tuple[str, float]]:
+    """Column name with a suffix unit -> (quantity, factor to SI): ``U_kts``, ``sigma_X_N``."""
+    known = {}
+    for quantity, choices in units().items():
+        for unit, factor in choices.items():
+            known[f"{quantity}_{unit}" if unit else quantity] = (quantity, factor)
+            if quantity in OUTPUTS or quantity == "value":
+                known[f"sigma_{quantity}_{unit}" if unit else f"sigma_{quantity}"] = (f"s_{quantity}", factor)
+    return known
+
+
+def owner(quantity: str) -> str:
+    """The listed quantity that gives ``s_X``, ``sigma_X`` or ``X_in`` its unit; empty for none."""
+    if quantity in units():
+        return quantity
+    for output in (*OUTPUTS, "value"):
+        if quantity in (f"s_{output}", f"sigma_{output}", *(f"{output}_{h}" for h in HARMONICS)):
+            return output
+    return ""
+
+
+def split(header: str) -> tuple[str, str | None]:
+    """A header as name and unit in brackets; the unit is None when there are no brackets."""
+    found = _BRACKET.match(header.strip())
+    if not found:
+        return header.strip(), None
+    unit = found["square"] if found["square"] is not None else found["round"]
+    return found["name"].strip(), unit.strip()
+
+
+def _clean(unit: str) -> str | None:
+    """A unit in the one spelling handed to pint, or None when it is not made of units."""
+    text = re.sub(r"(?<=[A-Za-z])-(?=[A-Za-z])", "*", unit)
+    text = text.replace("°", "deg").replace("º", "deg").translate(_RAISED)
+    text = re.sub(r"[·⋅.]", "*", text.replace("^", "**"))
+    text = re.sub(r"(?<![*/])\s+(?![*/])", "*", text.strip())
+    parts = [p.strip() for p in re.split(r"(?<!\*)\*(?!\*)|(/)", text) if p is not None]
+    found = []
+    for part in parts:
+        if part == "/":
+            found.append(part)
+            continue
+        match = _PART.fullmatch(part.strip("()"))
+        if part != "1" and not match:
+            return None
+        found.append(part if not match else match[1] + (f"**{match[2]}" if match[2] else ""))
+    if len(found) > 8:
+        return None
+    return re.sub(r"\*?/\*?", "/", "*".join(found))
+
+
+@cache
+def factor(quantity: str, unit: str) -> float | None:
+    """Factor from a unit to the SI unit of a quantity, or None when it is not one of its units.
+
+    Parameters
+    ----------
+    quantity : A quantity of ``data/quantities.csv``.
+    unit : Suffix unit (``kNm``) or any unit that pint knows (``lbf*ft``, ``km/h``, ``deg/s``).
+    """
+    choices = units()[quantity]
+    if unit in choices:
+        return choices[unit]
+    if unit in _NO_UNIT or quantity not in _spelled() or len(unit) > 40:
+        return choices.get("") if unit in _NO_UNIT else None
+    text = _clean(unit)
+    if text is None:
+        return None
+    import pint
+
+    registry = _registry()
+    wanted = _spelled()[quantity]
+    try:
+        given = registry.parse_units(text)
+        # pint counts angles as plain numbers; an angle without its unit is not one.
+        if "rad" in wanted and not _ANGLES & {str(u) for u in dict(given._units)}:
+            return None
+        if "rad" not in wanted and _ANGLES & {str(u) for u in dict(given._units)}:
+            return None
+        return float(registry.Quantity(1.0, given).to(wanted).magnitude)
+    except (pint.errors.PintError, ValueError, TypeError, AttributeError, ArithmeticError):
+        return None
+
+
+@cache
+def _registry() -> Any:
+    import pint
+
+    return pint.UnitRegistry()
+
+
+def allowed_units(quantity: str) -> str:
+    """The units of a quantity, in words."""
+    listed = [u for u in units()[quantity] if u]
+    more = f", or any unit with the dimension of {_spelled()[quantity]}" if quantity in _spelled() else ""
+    return (", ".join(listed) + more) if listed else "no unit: it is dimensionless"
+
+
+def _contradiction(quantity: str, header: str, unit: str, place: str) -> None:
+    """Refuse a header whose brackets hold another unit than the declaration; words in round ones are no unit."""
+    stated = split(header)[1]
+    if not quantity or stated in (None, "", unit) or (header.rstrip().endswith(")") and not is_unit(stated or "")):
+        return
+    there, here = factor(quantity, stated or ""), factor(quantity, unit)
+    if there is None or here is None or not math.isclose(there, here, rel_tol=1e-12):
+        raise InputError(place, f"unit {stated!r}, declared as {unit!r}", "one unit: leave it out of the declaration")
+
+
+def is_unit(text: str) -> bool:
+    """Whether some quantity has this unit, or pint knows it, capitals or not."""
+    if text in _NO_UNIT or any(text in choices for choices in units().values()):
+        return True
+    import pint
+
+    cleaned = _clean(text) if len(text) <= 40 else None
+    try:
+        return cleaned is not None and bool(_registry().parse_units(cleaned, case_sensitive=False))
+    except (pint.errors.PintError, ValueError, TypeError, AttributeError, ArithmeticError):
+        return False
+
+
+def column(header: str, declared: str | None, where: str) -> Column:
+    """What a column is, from its header and what the campaign declares it to be.
+
+    Parameters
+    ----------
+    header : As it stands in the file: ``U_kts``, ``Fx [kN]``, ``N'``.
+    declared : ``X`` or ``X [kN]`` from ``[source.columns]``; None to read the header itself.
+    where : File and row, for the error.
+
+    Raises
+    ------
+    InputError
+        For an unknown quantity, or a wrong, missing or contradicting unit.
+    """
+    if declared is None and header in suffixed():
+        return Column(header, *suffixed()[header])
+    place = f"{where}, column {header[:60]!r}"
+    if declared is not None and declared in suffixed():
+        quantity, scale = suffixed()[declared]
+        if owner(quantity) != declared or "" in units()[owner(quantity)]:
+            return Column(header, quantity, scale)
+    name, unit = split(header if declared is None else declared)
+    if declared is not None and unit is None:
+        unit = split(header)[1]
+    elif declared is not None:
+        _contradiction(owner(name.removesuffix("'")), header, unit or "", place)
+    if name.endswith("'") and owner(name[:-1]) in PRIMED:
+        name, unit = name[:-1], "-" if unit is None else unit
+    known = owner(name)
+    if not known:
+        stem = header.rsplit("_", 1)[0]
+        like = [c for c in suffixed() if c.rsplit("_", 1)[0] == stem]
+        text = ", ".join(like) or (
+            "a known quantity with its unit, such as U_mps, X_N, K [kN m]; or name it in [source.columns] or ignore"
+        )
+        raise InputError(where, f"unknown column or unit {header[:60]!r}", text)
+    quantity = f"s_{known}" if name.startswith("sigma_") else name
+    if known in PRIMED and unit is not None and unit in _NO_UNIT and unit != "":
+        return Column(header, quantity, 1.0, primed=True)
+    if unit is None and "" not in units()[known]:
+        raise InputError(place, f"no unit for {name}", allowed_units(known))
+    scale_to_si = factor(known, unit or "")
+    if scale_to_si is None:
+        raise InputError(place, f"unit {unit!r} for {name}", allowed_units(known))
+    return Column(header, quantity, scale_to_si)

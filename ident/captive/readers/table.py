@@ -1,0 +1,382 @@
+"""Tables: tidy CSV, Parquet, STAR-CCM+ monitor exports and white-space columns.
+
+Each is opened as a ``Sheet``: a header and rows that come a block at a time, so that a
+file of any size is read in bounded memory.
+"""
+
+from __future__ import annotations
+
+import fnmatch
+import itertools
+import re
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from ident.captive.quantities import Column, column, split
+from ident.captive.readers.text import COMMENTS, Dialect, Lines, blocks, decimal_mark, head, numbers, sniff
+from ident.captive.source import Source
+from sim.files.errors import InputError
+
+Array = NDArray[np.float64]
+# A table of runs has a row a run; what is longer is a time history.
+_MOST_RUNS = 100_000
+# Rows at the end of a history that may lack cells: what a run that is still being written leaves.
+_MOST_UNFINISHED = 10
+_NO_DATA = "; skip = '...' in [[source]] leaves out lines that are no data"
+
+
+@dataclass(frozen=True)
+class Sheet:
+    """An open table.
+
+    Attributes
+    ----------
+    path : The file.
+    header_row : Row of the header.
+    header : Column headers as they stand there.
+    numbers : Wanted column positions -> blocks (rows, wanted) of finite numbers.
+    cells : Blocks of (file row, cells as text), for a table of runs.
+    dialect : How its numbers are written.
+    first_row : Row where the data begin.
+    spacers : Columns without a name that are empty.
+    """
+
+    path: Path
+    header_row: int
+    header: list[str]
+    numbers: Callable[[list[int]], Iterator[Array]]
+    cells: Callable[[], Iterator[tuple[int, list[str]]]]
+    dialect: Dialect
+    first_row: int = 2
+    spacers: tuple[str, ...] = ()
+
+    @property
+    def where(self) -> str:
+        """The header, for errors."""
+        return f"{self.path}, row {self.header_row} (header)"
+
+
+def ignored(header: str, source: Source) -> bool:
+    """Whether the campaign leaves a column out."""
+    return any(fnmatch.fnmatchcase(h, p) for h in (header, split(header)[0]) for p in source.ignore)
+
+
+def once(where: str, header: list[str], source: Source) -> None:
+    """Refuse a column that stands twice and is not left out."""
+    for name in header:
+        if header.count(name) > 1 and not ignored(name, source):
+            raise InputError(where, f"column {name[:60]!r} stands twice", "each column once, or in ignore")
+
+
+def _blocks(path: Path, source: Source, comments: tuple[str, ...] = COMMENTS) -> Iterator[Lines]:
+    """Lines as the campaign says they are to be read: without what it skips, fixed widths set apart."""
+    edges = np.cumsum([0, *source.widths]).tolist()
+    for block in blocks(path, source.encoding, comments, source.skip):
+        if not source.widths:
+            yield block
+            continue
+        pieces = [[line[a:b] for a, b in itertools.pairwise(edges)] for line in block.text]
+        yield Lines(block.rows, [" ".join(cells) for cells in pieces], block.ended)
+
+
+def _whole_rows(
+    path: Path, data: Iterator[Lines], dialect: Dialect, wanted: list[int], header: list[str], solver: bool
+) -> Iterator[Array]:
+    """Numbers of every row; rows at the end that a run still being written leaves unfinished are left out.
+
+    Parameters
+    ----------
+    solver : A row without line end is never whole: its last number may be cut.
+
+    Raises
+    ------
+    InputError
+        For a cell that is no number, an unfinished row with others below it, or too many of them.
+    """
+    pending: InputError | None = None
+    left = 0
+    for block in data:
+        text, cut = block.text, 0
+        while cut < len(text) and _unfinished(text[-1 - cut], dialect, wanted, cut == 0 and not block.ended, solver):
+            cut += 1
+        if pending and cut < len(text):
+            raise pending
+        left += cut
+        whole = Lines(block.rows[: len(text) - cut], text[: len(text) - cut])
+        if whole.text:
+            yield numbers(path, whole, dialect, wanted, header, _NO_DATA)
+        if cut:
+            try:
+                numbers(path, Lines(block.rows[-cut:], text[-cut:]), dialect, wanted, header, _NO_DATA)
+            except InputError as error:
+                pending = pending or error
+        if pending and left > _MOST_UNFINISHED:
+            raise pending
+
+
+def _unfinished(line: str, dialect: Dialect, wanted: list[int], open_end: bool, solver: bool) -> bool:
+    """Whether a row lacks a wanted cell: blank, or cut off with the file."""
+    if open_end and solver:
+        return True
+    try:
+        cells = dialect.cells(line, "")
+    except InputError:
+        return open_end
+    if open_end and (len(cells) <= max(wanted) or dialect.number(cells[max(wanted)]) is None):
+        return True
+    return dialect.delimiter != " " and any(i >= len(cells) or not cells[i] for i in wanted)
+
+
+def _text_sheet(path: Path, source: Source, dialect: Dialect, header: list[str], first: Lines, skip: int) -> Sheet:
+    """A sheet over the lines after the header; ``skip`` is the last row that is not data."""
+
+    def data() -> Iterator[Lines]:
+        for block in _blocks(path, source):
+            if block.rows[0] > skip:
+                yield block
+            elif block.rows[-1] > skip:
+                i = next(k for k, row in enumerate(block.rows) if row > skip)
+                yield Lines(block.rows[i:], block.text[i:], block.ended)
+
+    def values(wanted: list[int]) -> Iterator[Array]:
+        yield from _whole_rows(path, data(), dialect, wanted, header, source.reader == "starccm")
+
+    def cells() -> Iterator[tuple[int, list[str]]]:
+        for block in data():
+            for row, line in zip(block.rows, block.text, strict=True):
+                found = dialect.cells(line, f"{path}, row {row}")
+                while len(found) > len(header) and not found[-1]:
+                    found.pop()
+                if len(found) > len(header):
+                    text = f"at most {len(header)}, as in the header"
+                    raise InputError(f"{path}, row {row}", f"{len(found)} cells", text)
+                # Spreadsheets drop blank cells at the end of a row.
+                yield row, found + [""] * (len(header) - len(found))
+
+    once(f"{path}, row {first.rows[0]} (header)", header, source)
+    return Sheet(path, first.rows[0], header, values, cells, dialect, skip + 1)
+
+
+def open_csv(path: Path, source: Source) -> Sheet:
+    """A delimited table: header, perhaps a row of units, rows.
+
+    Raises
+    ------
+    InputError
+        For a file without header, an unclosed quote, an ambiguous number, a column twice.
+    """
+    first, delimiter = _below_title(path, source)
+    dialect = sniff(path, first, delimiter, source.decimal, source.thousands)
+    where = f"{path}, row {first.rows[0]} (header)"
+    header = dialect.cells(first.text[0], where)
+    while header and not header[-1]:
+        header.pop()
+    if not header:
+        raise InputError(where, "a column without a name", "a name for every column")
+    rows = [dialect.cells(line, f"{path}, row {row}") for row, line in zip(first.rows[1:], first.text[1:], strict=True)]
+    longest = max((i + 1 for cells in rows[:1] for i, cell in enumerate(cells) if cell), default=0)
+    if longest > len(header):
+        text = "a name for every column; header_pattern and delimiter where a title stands above the header"
+        raise InputError(where, f"{len(header)} names above {longest} cells", text)
+    header, spacers = _nameless(header, rows, source, where)
+    skip = first.rows[0]
+    if source.units_row:
+        if len(first.text) < 2:
+            raise InputError(f"{path}, row {first.rows[0] + 1}", "nothing", "a row of units: units_row is true")
+        skip = first.rows[1]
+        given = dialect.cells(first.text[1], f"{path}, row {skip}")
+        if len(given) != len(header):
+            raise InputError(f"{path}, row {skip}", f"{len(given)} units", f"{len(header)}, one a column")
+        header = [f"{name} [{unit.strip('[]()')}]" if unit else name for name, unit in zip(header, given, strict=True)]
+    sheet = _text_sheet(path, source, dialect, header, first, skip)
+    return replace(sheet, spacers=spacers)
+
+
+def _nameless(
+    header: list[str], rows: list[list[str]], source: Source, where: str
+) -> tuple[list[str], tuple[str, ...]]:
+    """A header with ``column 3`` where no name stands, and those names; refused where cells stand below one."""
+    names = [name or f"column {i + 1}" for i, name in enumerate(header)]
+    spacers = tuple(named for named, name in zip(names, header, strict=True) if not name)
+    for i, name in enumerate(names):
+        if name in spacers and not ignored(name, source) and any(len(cells) > i and cells[i] for cells in rows):
+            text = f'a name for every column, or ignore = ["{name}"] in [[source]]'
+            raise InputError(where, f"a column without a name ({name})", text)
+    return names, spacers
+
+
+def _below_title(path: Path, source: Source) -> tuple[Lines, str]:
+    """The first lines from the header on, and the delimiter where the campaign or the file states it."""
+    first = head(path, source.encoding, COMMENTS, source.skip)
+    at = 0
+    if source.header_pattern:
+        at = _pattern_row(path, first, source)
+    elif first.text and (stated := re.fullmatch(r'"?sep=([,;\t])"?', first.text[0].strip(" "))):
+        # The line by which spreadsheets are told.
+        return Lines(first.rows[1:], first.text[1:]), source.delimiter or stated[1]
+    return Lines(first.rows[at:], first.text[at:]), source.delimiter
+
+
+def _pattern_row(path: Path, first: Lines, source: Source) -> int:
+    """Which of the first lines fits ``header_pattern``."""
+    pattern = re.compile(source.header_pattern)
+    at = next((i for i, line in enumerate(first.text) if pattern.search(line)), -1)
+    if at < 0:
+        raise InputError(str(path), "no line in the first 200 fits header_pattern", repr(source.header_pattern))
+    return at
+
+
+def open_columns(path: Path, source: Source) -> Sheet:
+    """A file of white-space columns below a header of free text.
+
+    The columns are those of ``names``, or those of the line that ``header_pattern`` finds.
+    Data start at the first line below that holds a number in every column.
+
+    Raises
+    ------
+    InputError
+        When neither is declared, no line fits, or no line of numbers follows.
+    """
+    first = head(path, source.encoding, skip=source.skip)
+    if source.names:
+        header, at = source.names, -1
+    elif source.header_pattern:
+        at = _pattern_row(path, first, source)
+        header = header_names(first.text[at])
+    else:
+        text = "names = [...] or header_pattern = '...' in [[source]], see docs/readers.md"
+        raise InputError(str(path), "columns without declared names", text)
+    below = next(_blocks(path, source, ("\0",)), Lines([], []))
+    below = Lines(below.rows[at + 1 : len(first.rows)], below.text[at + 1 : len(first.rows)])
+    dialect = Dialect(
+        source.delimiter or " ",
+        source.decimal or _columns_decimal(path, below, header, source),
+        source.thousands,
+    )
+    for row, line in zip(below.rows, below.text, strict=True):
+        cells = dialect.cells(line, f"{path}, row {row}") if dialect.delimiter == " " else line.split(dialect.delimiter)
+        if len(cells) == len(header) and all(dialect.number(c) is not None for c in cells):
+            lines = Lines([first.rows[max(at, 0)]], [first.text[max(at, 0)]])
+            return _text_sheet(path, source, dialect, header, lines, row - 1)
+    found = f"no line with {len(header)} numbers in the first {len(first.text)}"
+    text = f"numbers for {', '.join(header)[:200]}; decimal, delimiter or widths = [...] where blanks do not part them"
+    raise InputError(str(path), found, text)
+
+
+def _columns_decimal(path: Path, below: Lines, header: list[str], source: Source) -> str:
+    """The decimal mark of white-space columns, from the lines that have a number in each."""
+    mark = source.delimiter.strip(" ") or None
+    rows = [(row, [c.strip() for c in line.split(mark)]) for row, line in zip(below.rows, below.text, strict=True)]
+    form = re.compile(r"[+-]?[\d.,]*\d[.,]?\d*([eEdD][+-]?\d{1,3})?", re.ASCII)
+    full = [
+        (row, c) for row, cells in rows if len(cells) == len(header) for c in cells if all(map(form.fullmatch, cells))
+    ]
+    return decimal_mark(path, [(row, c) for row, c in full if "," in c or "." in c], None, source.thousands)
+
+
+def header_names(line: str) -> list[str]:
+    """Column names of a header line: split at tabs or two blanks, else at single blanks."""
+    text = line.strip().lstrip("#%!").strip()
+    wide = [c.strip() for c in re.split(r"\t|\s{2,}", text) if c.strip()]
+    if len(wide) > 1:
+        return wide
+    return re.findall(r"[^\s\[(]+(?:\s?[\[(][^\])]*[\])])?", text)
+
+
+def position(sheet: Sheet, name: str) -> int:
+    """Where a column of ``[[source.subtract]]`` stands, by its whole header or the header without its unit.
+
+    Raises
+    ------
+    InputError
+        When there is none.
+    """
+    for names in (sheet.header, [split(h)[0] for h in sheet.header]):
+        if name in names:
+            return names.index(name)
+    shown = ", ".join(sheet.header)[:200]
+    raise InputError(sheet.where, f"no column {name[:60]!r}, which [[source.subtract]] names", shown)
+
+
+def columns_of(sheet: Sheet, source: Source, text: tuple[str, ...]) -> list[Column | None]:
+    """What every column of a sheet is; None for ignored and text columns.
+
+    Parameters
+    ----------
+    sheet : The open table.
+    source : Its ``columns``, ``patterns`` and ``ignore``; columns of ``subtract`` are passed over.
+    text : Names of the text columns of a run table.
+
+    Raises
+    ------
+    InputError
+        For an unknown column or unit, a pattern that fits no or several columns, or two
+        columns of one quantity.
+    """
+    by_pattern = _by_pattern(sheet, source)
+    parts = {position(sheet, name) for one in source.subtract for name in one.columns}
+    found: list[Column | None] = []
+    for i, header in enumerate(sheet.header):
+        name = split(header)[0]
+        declared = by_pattern.get(header) or source.columns.get(header) or source.columns.get(name)
+        if header in sheet.spacers:
+            found.append(None)
+        elif i in parts:
+            if declared is not None:
+                found_twice = f"column {header[:60]!r} in [[source.subtract]] and in [source.columns] or patterns"
+                raise InputError(sheet.where, found_twice, "one of the two")
+            found.append(None)
+        elif (declared is None and (source.patterns or ignored(header, source))) or (declared or header) in text:
+            found.append(None)
+        else:
+            found.append(column(header, declared, sheet.where))
+    for key in source.columns:
+        if key not in sheet.header and key not in [split(h)[0] for h in sheet.header]:
+            shown = ", ".join(sheet.header)[:200]
+            raise InputError(sheet.where, f"no column {key[:60]!r}, which [source.columns] names", shown)
+    quantities = [c.quantity for c in found if c]
+    for quantity in quantities:
+        if quantities.count(quantity) > 1:
+            raise InputError(sheet.where, f"{quantity} stands twice", "one column a quantity")
+    return found
+
+
+def _by_pattern(sheet: Sheet, source: Source) -> dict[str, str]:
+    """Header -> declared quantity, by the regular expressions of ``patterns``."""
+    if not (source.patterns or source.columns) and any(re.search(r"\bMonitor\b", h) for h in sheet.header):
+        text = "a table [source.patterns] that names the monitors, see docs/readers.md"
+        raise InputError(sheet.where, "monitors without names", text)
+    found: dict[str, str] = {}
+    for pattern, quantity in source.patterns.items():
+        fits = [h for h in sheet.header if re.search(pattern, h)]
+        if len(fits) != 1 or fits[0] in found:
+            shown = ", ".join(repr(h[:60]) for h in (fits or sheet.header)[:8])
+            number = "no column fits" if not fits else "more than one fit"
+            raise InputError(sheet.where, f"{number} pattern {pattern!r}", f"one column a pattern; here: {shown}")
+        found[fits[0]] = quantity
+    return found
+
+
+def run_cells(sheet: Sheet) -> tuple[pd.DataFrame, list[int]]:
+    """A table of runs as text, with the file row of each.
+
+    Raises
+    ------
+    InputError
+        When there is no row, or so many that it is a time history.
+    """
+    rows, cells = [], []
+    for row, found in sheet.cells():
+        rows.append(row)
+        cells.append(found)
+        if len(rows) > _MOST_RUNS:
+            text = f"at most {_MOST_RUNS} runs; a time history is declared with rows = 'history'"
+            raise InputError(f"{sheet.path}, row {row}", "more rows", text)
+    if not rows:
+        raise InputError(str(sheet.path), "no runs", "at least one row below the header")
+    return pd.DataFrame(cells, columns=sheet.header, dtype=str), rows

@@ -1,0 +1,377 @@
+"""Files of a source to rows of the run table, in SI and the campaign's own frame."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from ident.captive.campaign_file import CampaignFile
+from ident.captive.conversions import DIRECT, MOTION, dimensional, quantity_of
+from ident.captive.histories import Channels, NotRising, Pieces, Reduced, reduce, states
+from ident.captive.quantities import Column, column, owner, suffixed
+from ident.captive.readers import openfoam
+from ident.captive.readers.opening import matching, open_sheet, reader_of
+from ident.captive.readers.table import Sheet, columns_of, run_cells
+from ident.captive.readers.text import LARGEST, Dialect
+from ident.captive.source import NO_COLUMNS, Source
+from ident.captive.subtract import off_samples, off_table, taken_columns
+from sim.boat.catalogue import OUTPUTS
+from sim.files.errors import InputError
+
+TEXT = ("run_id", "test", "part", "quality", "source", "copy_of", "exclude", "reason", "decoupled", "coefficient")
+REQUIRED = ("run_id", "test", "part", "quality", "source")
+_PLAIN = Dialect()
+# What [source.within] can limit, and by how much of itself a limit is widened.
+_STATES = ("U", "alpha", "beta", "D0", "plane", "n", "J", *MOTION)
+_SLACK = 1e-9
+
+
+@dataclass
+class Found:
+    """What some sources gave.
+
+    Attributes
+    ----------
+    tables : Runs, a table a file: text columns, quantities in SI, ``file``, ``row``, ``reduction``.
+    reduced : The histories that were reduced, in order.
+    refused : Those whose time stamps do not rise.
+    inputs : Paths that were read.
+    """
+
+    tables: list[pd.DataFrame] = field(default_factory=list)
+    reduced: list[Reduced] = field(default_factory=list)
+    refused: list[NotRising] = field(default_factory=list)
+    inputs: list[Path] = field(default_factory=list)
+
+
+def source_runs(folder: Path, source: Source, header: CampaignFile, found: Found) -> list[pd.DataFrame]:
+    """Add all runs of one source to what was found.
+
+    Parameters
+    ----------
+    folder : The campaign's.
+    source : One ``[[source]]``.
+    header : The campaign, for frame, scale and density.
+    found : Its lists grow.
+
+    Returns
+    -------
+    The tables that were added.
+
+    Raises
+    ------
+    InputError
+        Naming file, row, column, what was found and what is allowed.
+    """
+    paths = matching(folder, source)
+    where = str(folder / "campaign.toml")
+    tables: list[pd.DataFrame] = []
+    for path in paths:
+        stated = constants(folder, path, source)
+        name = path.relative_to(folder).as_posix()
+        try:
+            if source.rows == "history":
+                table, reduced = _from_histories(path, source, header, stated, where)
+                found.reduced += [replace(one, file=name) for one in reduced]
+            else:
+                table = _from_table(path, source, header, stated, where)
+        except NotRising as error:
+            # Every such file is to be named, not the first alone.
+            error.file = name
+            found.refused.append(error)
+            continue
+        tables.append(outside_excluded(table.assign(file=name), source, where))
+    found.tables += tables
+    found.inputs += paths
+    return tables
+
+
+def outside_excluded(table: pd.DataFrame, source: Source, where: str) -> pd.DataFrame:
+    """Runs with every load excluded where their state is outside ``[source.within]``.
+
+    Parameters
+    ----------
+    table : Runs in SI, in the campaign's own frame.
+    source : Its ``within``: state with a suffix unit -> lowest and highest value.
+    where : The campaign file.
+
+    Returns
+    -------
+    ``table`` with ``exclude`` and ``reason`` filled in for these runs, so that fit and checks
+    leave them out and say why.
+
+    Raises
+    ------
+    InputError
+        For a state that is not one, has no unit, or that no run of the files gives.
+    """
+    out = table
+    for name, (low, high) in source.within.items():
+        place = f"{where}, key source.within.{name}"
+        if name not in suffixed() or suffixed()[name][0] not in _STATES:
+            known = ", ".join(c for c, (q, _) in suffixed().items() if q in ("U", "alpha", "beta", "r"))
+            raise InputError(place, "no state of a run with its unit", known + " and the like")
+        quantity, factor = suffixed()[name]
+        if quantity not in out or out[quantity].isna().all():
+            raise InputError(place, f"no {quantity} in the runs of {source.files}", "a state that the runs give")
+        value = out[quantity].astype(float)
+        # A limit that stands in the file in other digits is still inside.
+        slack = _SLACK * max(abs(low), abs(high)) * factor
+        outside = (value < low * factor - slack) | (value > high * factor + slack)
+        loads = " ".join(o for o in (*OUTPUTS, *DIRECT) if o in out)
+        out = out.assign(
+            exclude=out["exclude"].mask(outside, loads),
+            reason=out["reason"].mask(outside, f"{name} beyond {low:g} to {high:g}"),
+        )
+    return out
+
+
+def constants(folder: Path, path: Path, source: Source) -> tuple[dict[str, str], dict[str, float], set[str]]:
+    """What the campaign says of every run of a file: ``constants``, and ``match`` on its path.
+
+    Returns
+    -------
+    words : Text columns.
+    numbers : Quantities in SI.
+    primed : Those that are dimensionless.
+
+    Raises
+    ------
+    InputError
+        For a path that does not match, an unknown quantity, or no finite number.
+    """
+    where = f"{folder / 'campaign.toml'}, key source.constants"
+    given: dict[str, Any] = dict(source.constants)
+    if source.match:
+        name = path.relative_to(folder).as_posix()
+        found = re.search(source.match, name)
+        if not found:
+            raise InputError(f"{folder / 'campaign.toml'}, key source.match", f"{name!r} does not match", source.match)
+        given |= {k: v for k, v in found.groupdict().items() if v is not None}
+    words: dict[str, str] = {}
+    numbers: dict[str, float] = {}
+    primed: set[str] = set()
+    for key, value in given.items():
+        if key in TEXT:
+            words[key] = str(value).strip()
+            continue
+        place = f"{where}.{key}"
+        if key in suffixed() or not isinstance(value, str):
+            kind = column(key, None, where)
+            number = _PLAIN.number(str(value))
+            if number is None:
+                raise InputError(place, repr(str(value)[:60]), "a finite number")
+            numbers[kind.quantity] = number * kind.factor
+            primed |= {kind.quantity} if kind.primed else set()
+        elif owner(key):
+            numbers[key] = quantity_of(value, owner(key), place)
+        else:
+            raise InputError(place, repr(value[:60]), "a quantity, or one of " + ", ".join(TEXT))
+    return words, numbers, primed
+
+
+Stated = tuple[dict[str, str], dict[str, float], set[str]]
+
+
+def _from_table(path: Path, source: Source, header: CampaignFile, stated: Stated, where: str) -> pd.DataFrame:
+    """A table with a row a run."""
+    words, numbers, primed = stated
+    sheet = open_sheet(path, source)
+    kinds = columns_of(sheet, source, TEXT)
+    table, rows = run_cells(sheet)
+    columns: dict[str, Any] = {}
+    for name, kind in zip(sheet.header, kinds, strict=True):
+        if kind is None:
+            text = source.columns.get(name, name)
+            if text in TEXT:
+                columns[text] = table[name].str.strip().to_numpy()
+        else:
+            columns[kind.quantity] = _numbers(sheet, table[name], rows, kind)
+            primed = primed | ({kind.quantity} if kind.primed else set())
+    for name, value in {**words, **numbers}.items():
+        if name in columns:
+            raise InputError(f"{sheet.where}, column {name}", "also in [source.constants]", "one of the two")
+        columns[name] = value
+    _required(sheet, columns, source)
+    if "run_id" not in columns:
+        columns["run_id"] = [f"{path.stem}-{row}" for row in rows]
+    columns.setdefault("source", path.name)
+    for name in TEXT:
+        columns.setdefault(name, "")
+    out = pd.DataFrame({**columns, "file": path.name, "row": rows, "reduction": ""}, index=range(len(rows)))
+    out = dimensional(out, primed, source.normalisation, header, where)
+    if source.subtract:
+        totals = {q for q in columns if owner(q) in OUTPUTS and not q.startswith(("s_", "sigma_"))}
+        taken = taken_columns(sheet, source, header, totals, where)
+        cells = pd.DataFrame({i: _numbers(sheet, table.iloc[:, t.at], rows, t.kind) for i, t in enumerate(taken)})
+        out = off_table(out, taken, cells, source, header, sheet)
+    return _spread(out, source, header, str(path)) if source.reduction else out
+
+
+def _required(sheet: Sheet, columns: dict[str, Any], source: Source) -> None:
+    optional = {"run_id", "source"} if source.columns or source.constants else set()
+    optional |= {"test"} if source.reduction else set()
+    for name in REQUIRED:
+        if name not in columns and name not in optional:
+            text = f"columns {', '.join(REQUIRED)} and quantities"
+            raise InputError(str(sheet.path), f"column {name} missing", text)
+
+
+def _numbers(sheet: Sheet, text: pd.Series, rows: list[int], kind: Column) -> np.ndarray:
+    """A column of a run table as numbers; blank is NaN."""
+    values = np.full(len(text), np.nan)
+    for i, cell in enumerate(text):
+        if not cell.strip():
+            continue
+        value = sheet.dialect.number(cell)
+        if value is None:
+            place = f"{sheet.path}, row {rows[i]}, column {kind.name[:60]}"
+            raise InputError(place, repr(cell[:60]), f"a finite number of at most {LARGEST:g}, or blank")
+        if value < 0.0 and (kind.quantity.startswith("s_") or kind.quantity == "rel_sigma"):
+            raise InputError(f"{sheet.path}, row {rows[i]}, column {kind.name[:60]}", cell[:60], "zero or more")
+        values[i] = value * kind.factor
+    return values
+
+
+def _spread(table: pd.DataFrame, source: Source, header: CampaignFile, where: str) -> pd.DataFrame:
+    """Rows of harmonics to the four states of each oscillation."""
+    assert source.reduction is not None
+    frame, ittc = header.frame.frame, header.frame.angles == "ittc"
+    found = []
+    for run in table.to_dict("records"):
+        place = f"{where}, row {run['row']}"
+        found += states({str(k): v for k, v in run.items()}, source.reduction, frame, ittc, place)
+    return pd.DataFrame(found)
+
+
+def _from_histories(
+    path: Path, source: Source, header: CampaignFile, stated: Stated, where: str
+) -> tuple[pd.DataFrame, list[Reduced]]:
+    """A file or case that is one history a part."""
+    assert source.reduction is not None
+    words, numbers, primed = stated
+    rule = source.reduction
+    if primed:
+        one_run = pd.DataFrame([{**numbers, "file": path.name, "row": 1}])
+        made = dimensional(one_run, primed, source.normalisation, header, where).iloc[0]
+        numbers = {k: float(made[k]) for k in numbers}
+    frame, ittc = header.frame.frame, header.frame.angles == "ittc"
+    rows: list[dict[str, Any]] = []
+    reduced = []
+    for part, channels in _channels(path, source, header, numbers, where):
+        own = dict(words) | ({"part": part} if part else {})
+        # Of a folder "drift_2.5" all is its name.
+        name = own.get("run_id") or (path.name if path.is_dir() else path.stem)
+        own["run_id"] = f"{name}-{part}" if part else name
+        frequency = numbers.get("frequency", rule.frequency_hz)
+        values, one = reduce(channels, rule, own["run_id"], frequency)
+        for quantity in values:
+            if quantity in numbers and quantity != "frequency":
+                found = f"{quantity} is measured and stands in [source.constants]"
+                raise InputError(str(channels.path), found, "one of the two")
+        run = {**dict.fromkeys(TEXT, ""), "source": f"{path.name}, reduced", **own, **numbers, **values}
+        run |= {"file": path.name, "row": 1, "reduction": one.words(), "converged": one.fit.converged}
+        rows += states(run, rule, frame, ittc, str(path)) if rule.kind == "oscillatory" else [run]
+        reduced.append(one)
+    out = pd.DataFrame(rows)
+    for name in REQUIRED:
+        missing = (out[name] == "") if name in out else pd.Series(True, index=out.index)
+        if missing.any():
+            raise InputError(str(path), f"{name} missing", f"{name} in [source.constants], or (?P<{name}>...) in match")
+    return out, reduced
+
+
+def _channels(
+    path: Path, source: Source, header: CampaignFile, numbers: dict[str, float], where: str
+) -> Iterator[tuple[str, Channels]]:
+    """The histories of a path: part (empty where the campaign names it) and channels."""
+    if reader_of(path, source) == "openfoam":
+        if source.subtract:
+            raise InputError(f"{where}, key source.subtract", "an OpenFOAM case", NO_COLUMNS)
+        yield from _openfoam(path, source, header, where)
+        return
+    sheet = open_sheet(path, source)
+    wanted = [(i, k) for i, k in enumerate(columns_of(sheet, source, ())) if k is not None]
+    if not wanted:
+        raise InputError(sheet.where, "no column that is a quantity", "time and loads")
+    names = [k.quantity for _, k in wanted]
+    taken = taken_columns(sheet, source, header, {n for n in names if n in OUTPUTS}, where)
+
+    def to_si(kind: Column) -> float:
+        if not kind.primed:
+            return kind.factor
+        one = pd.DataFrame([{kind.quantity: 1.0, "U": numbers.get("U"), "file": path.name, "row": 1}])
+        made = dimensional(one, {kind.quantity}, source.normalisation, header, where).iloc[0]
+        return float(made[kind.quantity]) * kind.factor
+
+    factors = np.array([to_si(kind) for kind in (*(k for _, k in wanted), *(t.kind for t in taken))])
+    channels, matrix = off_samples(names, taken, factors)
+
+    def pieces() -> Iterator[np.ndarray]:
+        for block in sheet.numbers([*(i for i, _ in wanted), *(t.at for t in taken)]):
+            yield block @ matrix if taken else block * factors
+
+    yield "", Channels(path, channels, pieces, sheet.first_row)
+
+
+def _openfoam(path: Path, source: Source, header: CampaignFile, where: str) -> Iterator[tuple[str, Channels]]:
+    """The function objects of an OpenFOAM case, each the history of one part."""
+    if source.rho_inf is None:
+        text = "the rhoInf of the function object: 1 for kinematic loads, or the density it used"
+        raise InputError(f"{where}, key source.rho_inf", "nothing", text)
+    if not path.is_dir():
+        raise InputError(str(path), "a file", "a case folder, its postProcessing, or one function object in it")
+    try:
+        found = openfoam.objects(path)
+    except OSError as error:
+        raise InputError(str(path), f"cannot be read: {error.strerror}", "a readable folder") from error
+    if not found:
+        others = sorted({p.name for p in path.glob("**/*.dat")})[:5]
+        seen = f", only {', '.join(others)}" if others else ""
+        text = "postProcessing/<function object>/<start>/forces.dat or force.dat; coefficients are not read"
+        raise InputError(str(path), f"no output of forces{seen}", text)
+    for name in source.parts:
+        if name not in found:
+            raise InputError(str(path), f"no function object {name!r}", ", ".join(found))
+    twice = [part for part in source.parts.values() if list(source.parts.values()).count(part) > 1]
+    if twice:
+        text = "one function object a part: it sums the patches that it is given"
+        raise InputError(f"{where}, key source.parts", f"{twice[0]!r} twice", text)
+    chosen = source.parts or (dict.fromkeys(found, "") if len(found) == 1 else {})
+    if not chosen:
+        text = f"[source.parts] naming the part of each: {', '.join(found)}"
+        raise InputError(str(path), f"{len(found)} function objects", text)
+    for name, part in chosen.items():
+        yield part, Channels(path, ["time", *openfoam.LOADS], _foam_pieces(found[name], source, header))
+
+
+def _foam_pieces(folder: Path, source: Source, header: CampaignFile) -> Pieces:
+    """Starts reading one function object: SI, moments about the campaign's point."""
+    density = header.fluid.density_kgpm3 / float(source.rho_inf or 1.0)
+    point = header.moment_point
+    origin = source.vehicle_origin
+
+    def pieces() -> Iterator[np.ndarray]:
+        fixed = None
+        for values, centre, moving in openfoam.loads(folder):
+            if not moving:
+                if fixed is not None and (centre != fixed).any():
+                    raise InputError(str(folder), f"CofR {fixed} and {centre}", "one moment point in all restarts")
+                fixed = centre
+            elif origin is not None:
+                text = "no vehicle_origin: a moving CofR is the body's moment point"
+                raise InputError(str(folder), "CofR moves", text)
+            out = values.copy()
+            if origin is not None:
+                arm = centre - np.array(origin) - np.array([point.x_m, point.y_m, point.z_m])
+                out[:, 4:] += np.cross(np.broadcast_to(arm, (len(out), 3)), out[:, 1:4])
+            out[:, 1:] *= density
+            yield out
+
+    return pieces

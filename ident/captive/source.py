@@ -1,0 +1,160 @@
+"""``[[source]]`` of ``campaign.toml``: which files, in which format, and what stands in them."""
+
+from __future__ import annotations
+
+import re
+from typing import Annotated, Literal
+
+from pydantic import Field, field_validator, model_validator
+
+from sim.files.schema import Data
+
+READERS = ("table", "parquet", "starccm", "columns", "openfoam")
+# Motion of an oscillatory test -> velocity and acceleration it makes.
+MOTIONS = {
+    "surge": ("u", "udot"),
+    "sway": ("v", "vdot"),
+    "heave": ("w", "wdot"),
+    "roll": ("p", "pdot"),
+    "pitch": ("q", "qdot"),
+    "yaw": ("r", "rdot"),
+}
+NO_COLUMNS = "no subtract: a function object of the patches that are wanted, OpenFOAM's files have no other columns"
+Vector = Annotated[list[float], Field(min_length=3, max_length=3)]
+Positive = Annotated[float, Field(gt=0, le=1e9)]
+Span = Annotated[list[float], Field(min_length=2, max_length=2)]
+
+# Text encodings that can be stated; without one it is found from the file's first bytes.
+Encoding = Literal["utf-8", "utf-16-le", "utf-16-be", "latin-1", "cp1252", "shift_jis", "cp932", "euc_jp", "gb18030"]
+
+
+class Reduction(Data):
+    """How a time history becomes runs.
+
+    Attributes
+    ----------
+    kind : ``steady``: means. ``oscillatory``: harmonics 0-3 at the known frequency, then
+        four runs, at the ends of the velocity and of the acceleration. ``acceleration``:
+        the value at mid-time of a constant acceleration.
+    start_s, end_s : Window, by hand; the start-up transient is found within it.
+    rate_hz : Sampling rate, where the time column cannot be trusted; time is then the row.
+    motion : What oscillates.
+    frequency_hz : Its frequency, unless a column ``frequency`` gives it.
+    amplitude : Amplitude of the displacement [m or rad], unless a column ``displacement``
+        measures it.
+    phase_deg : Phase of the displacement at time zero, A sin(2 pi f t + phase).
+    """
+
+    kind: Literal["steady", "oscillatory", "acceleration"]
+    start_s: float | None = None
+    end_s: float | None = None
+    rate_hz: Positive | None = None
+    motion: Literal["surge", "sway", "heave", "roll", "pitch", "yaw"] | None = None
+    frequency_hz: Positive | None = None
+    amplitude: Annotated[float, Field(gt=0, le=1e6)] | None = None
+    phase_deg: Annotated[float, Field(ge=-360, le=360)] = 0.0
+
+    @model_validator(mode="after")
+    def _motion_is_named(self) -> Reduction:
+        if self.kind == "oscillatory" and self.motion is None:
+            raise ValueError(f"motion, one of {', '.join(MOTIONS)}: an oscillatory test needs it")
+        if self.start_s is not None and self.end_s is not None and self.end_s <= self.start_s:
+            raise ValueError("end_s after start_s")
+        return self
+
+
+class Subtract(Data):
+    """Measured loads of a part, taken off the total: a rudder on its own balance, a thrust column.
+
+    Attributes
+    ----------
+    what : The part.
+    source : Where this is said.
+    columns : Header -> load of the part, along the campaign's axes, perhaps with unit: ``RY = "Y [N]"``.
+    at_m : Where its forces act and its moments are about, from the vehicle's origin, in the
+        campaign's axes and scale: the moment of the forces is taken off too. Without it the moments
+        in ``columns`` are about the campaign's moment point, and have to be complete.
+    factor : On all of its loads: -1 for a column of the other sign, 1 + a_H for a rudder that also
+        loads the hull.
+    """
+
+    what: Annotated[str, Field(min_length=1, max_length=200)]
+    source: Annotated[str, Field(min_length=1, max_length=500)]
+    columns: Annotated[dict[str, str], Field(min_length=1)]
+    at_m: Vector | None = None
+    factor: Annotated[float, Field(ge=-100, le=100)] = 1.0
+
+
+class Source(Data):
+    """Some files of a campaign that share a format; every key is in ``docs/readers.md``.
+
+    ``within`` limits the states whose loads are used: ``beta_deg = [-20, 20]``. Runs outside
+    stay in the run table with all their loads excluded.
+    """
+
+    files: Annotated[str, Field(min_length=1, max_length=300)]
+    reader: Literal["table", "parquet", "starccm", "columns", "openfoam"] | None = None
+    rows: Literal["runs", "history"] = "runs"
+    columns: dict[str, str] = Field(default_factory=dict)
+    patterns: dict[str, str] = Field(default_factory=dict)
+    ignore: list[str] = Field(default_factory=list)
+    names: list[str] = Field(default_factory=list)
+    header_pattern: str = ""
+    widths: Annotated[list[Annotated[int, Field(ge=1, le=1000)]], Field(max_length=1000)] = Field(default_factory=list)
+    units_row: bool = False
+    delimiter: Literal["", ",", ";", "\t", " "] = ""
+    decimal: Literal["", ".", ","] = ""
+    thousands: Literal["", ".", ",", "'", " "] = ""
+    encoding: Encoding = "utf-8"
+    skip: str = ""
+    constants: dict[str, str | float] = Field(default_factory=dict)
+    within: dict[str, Span] = Field(default_factory=dict)
+    match: str = ""
+    normalisation: str = ""
+    parts: dict[str, str] = Field(default_factory=dict)
+    rho_inf: Positive | None = None
+    vehicle_origin: Vector | None = None
+    reduction: Reduction | None = None
+    subtract: list[Subtract] = Field(default_factory=list)
+
+    @field_validator("match", "header_pattern", "skip")
+    @classmethod
+    def _pattern_compiles(cls, text: str) -> str:
+        _compiled(text)
+        return text
+
+    @field_validator("patterns")
+    @classmethod
+    def _patterns_compile(cls, patterns: dict[str, str]) -> dict[str, str]:
+        for text in patterns:
+            _compiled(text)
+        return patterns
+
+    @field_validator("within")
+    @classmethod
+    def _spans_rise(cls, within: dict[str, list[float]]) -> dict[str, list[float]]:
+        for name, (low, high) in within.items():
+            if not low < high:
+                raise ValueError(f"{name} = [lowest, highest], the first below the second")
+        return within
+
+    @model_validator(mode="after")
+    def _reduction_fits(self) -> Source:
+        if self.rows == "history" and self.reduction is None:
+            raise ValueError("a table [source.reduction]: rows = 'history' needs it")
+        if self.rows == "runs" and self.reduction is not None and self.reduction.kind != "oscillatory":
+            raise ValueError("rows = 'history': only time histories are reduced")
+        if self.reader == "openfoam" and self.rows != "history":
+            raise ValueError("rows = 'history': OpenFOAM writes time histories")
+        if self.reader == "openfoam" and self.subtract:
+            raise ValueError(NO_COLUMNS)
+        if self.files.startswith(("/", "~")) or ".." in self.files.replace("\\", "/").split("/"):
+            raise ValueError("a path below the campaign folder")
+        return self
+
+
+def _compiled(text: str) -> None:
+    try:
+        re.compile(text)
+    except (re.error, RecursionError, OverflowError) as error:
+        raise ValueError(f"a regular expression: {error}") from error

@@ -1,0 +1,1 @@
+"""Quality checks of a campaign: what is wrong with the runs, with evidence and remedy."""

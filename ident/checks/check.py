@@ -1,0 +1,209 @@
+"""Quality checks of a campaign: run them, show them, hand them on.
+
+The checks themselves are pure functions over the run table, the vehicle and tables of
+derivatives, registered by name; ``data/checks.csv`` holds their limits and remedies.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pandas as pd
+
+from ident.captive.campaign import Campaign
+from ident.captive.readers.opening import open_sheet
+from ident.captive.readers.table import run_cells
+from ident.captive.source import Source
+from ident.checks import copies as checks_copies
+from ident.checks import histories as checks_histories
+from ident.checks import physics as checks_physics
+from ident.checks import runs as checks_runs
+from ident.checks import tables as checks_tables
+from ident.checks.findings import SEVERITIES, Body, Evidence, Finding, registered, rules
+from ident.identification.identify import Identification, identify
+from sim.files.errors import InputError
+
+if TYPE_CHECKING:
+    from rich.console import Console
+    from rich.table import Table
+
+# Importing a module enters its checks in the registry.
+_MODULES = (checks_copies, checks_histories, checks_physics, checks_runs, checks_tables)
+_COLOURS = {"error": "red", "warning": "yellow", "info": "cyan"}
+
+
+def evidence_of(campaign: Campaign, folder: Path | None = None) -> Evidence:
+    """What the checks may look at in a campaign.
+
+    Parameters
+    ----------
+    campaign : From ``read_campaign``.
+    folder : Where it lies: channel descriptions beside the runs are read from ``*.txt``, and
+        the files of ``[tables]``.
+
+    Raises
+    ------
+    InputError
+        For a table of ``[tables]`` that is missing or lacks a column.
+    """
+    particulars, header = campaign.vehicle.particulars, campaign.header
+    mass = particulars.displaced_mass.value
+    x, y, z = (particulars.mass.value * k**2 for k in particulars.radius_of_gyration.value)
+    length, scale = particulars.length.value, header.scale
+    draught = scale.ratio * scale.draught_m if scale.draught_m else None
+    body = Body(length, header.fluid.density_kgpm3, mass, (x, y, z), draught, f"vehicle {campaign.vehicle.name}")
+    beside = {k: read_table(folder, v, k) for k, v in header.tables.given().items()} if folder else {}
+    return Evidence(
+        runs=campaign.runs,
+        body=body,
+        vehicle=campaign.vehicle,
+        campaign=campaign,
+        labels=read_labels(folder) if folder else None,
+        histories=campaign.reduced,
+        configurations=beside.get("configurations"),
+        reference=beside.get("reference"),
+        tested_length=scale.ratio * scale.length_m,
+    )
+
+
+# Columns of the files that [tables] names; the second of numbers or of text.
+_BESIDE = {"configurations": ("configuration", "appendages"), "reference": ("coefficient", "value")}
+
+
+def read_table(folder: Path, name: str, kind: str) -> pd.DataFrame:
+    """A table that ``[tables]`` of a campaign names.
+
+    Parameters
+    ----------
+    folder : The campaign's.
+    name : File in it.
+    kind : ``configurations`` or ``reference``.
+
+    Returns
+    -------
+    Its two columns, file and row.
+
+    Raises
+    ------
+    InputError
+        For a file that is missing, a column that is, or a value that is no number.
+    """
+    path = folder / name
+    if not path.is_file():
+        raise InputError(f"{folder / 'campaign.toml'}, key tables.{kind}", f"no file {name!r}", "a CSV file beside it")
+    sheet = open_sheet(path, Source(files=name, reader="table"))
+    for column in _BESIDE[kind]:
+        if column not in sheet.header:
+            text = f"columns {' and '.join(_BESIDE[kind])}"
+            raise InputError(sheet.where, f"no column {column!r}", text)
+    cells, rows = run_cells(sheet)
+    table = cells[list(_BESIDE[kind])].apply(lambda column: column.str.strip())
+    if kind == "reference":
+        numbers = [sheet.dialect.number(cell) for cell in table["value"]]
+        for row, cell, number in zip(rows, table["value"], numbers, strict=True):
+            if number is None:
+                raise InputError(f"{path}, row {row}, column value", repr(cell[:60]), "a finite number")
+        table["value"] = numbers
+    return table.assign(file=path.name, row=rows)
+
+
+def read_labels(folder: Path) -> pd.DataFrame | None:
+    """Channel descriptions, ``[sheet] number | column | unit | description``, from ``*.txt``.
+
+    Returns
+    -------
+    Columns sheet, column, description, file, row; None when no file has such lines.
+    """
+    found = []
+    pattern = re.compile(r"^(?:\[(?P<sheet>[^\]]*)\])?\s*\d+\s*\|(?P<name>[^|]*)\|[^|]*\|(?P<text>[^|]*)$")
+    for path in sorted(folder.glob("*.txt")):
+        # Line by line: a tank file of any size may be a .txt beside the campaign.
+        with path.open(encoding="utf-8", errors="replace") as stream:
+            for row, line in enumerate(stream, start=1):
+                hit = pattern.match(line.rstrip("\n")) if "|" in line else None
+                if hit:
+                    sheet, name, text = (str(hit[k] or "").strip() for k in ("sheet", "name", "text"))
+                    found.append((sheet, name, text, path.name, row))
+    return pd.DataFrame(found, columns=["sheet", "column", "description", "file", "row"]) if found else None
+
+
+def run(evidence: Evidence) -> list[Finding]:
+    """Every finding of every check, errors first.
+
+    Parameters
+    ----------
+    evidence : What there is; checks without their evidence find nothing.
+    """
+    # Numbers no boat has must not stop the check that says so.
+    with np.errstate(all="ignore"):
+        found = [f for name, own in registered().items() for check in own for f in check(evidence, rules()[name])]
+    return sorted(found, key=lambda f: -SEVERITIES.index(f.severity))
+
+
+def check_campaign(campaign: Campaign, folder: Path | None = None) -> list[Finding]:
+    """Quality checks of a campaign, errors first.
+
+    Constant coefficients are identified for it and checked as a table of derivatives.
+    """
+    evidence = evidence_of(campaign, folder)
+    if campaign.vehicle.term_set != "reduced" and not campaign.runs.empty:
+        evidence = replace(evidence, derivatives=constants(identify(campaign)))
+    return run(evidence)
+
+
+def constants(found: Identification) -> pd.DataFrame:
+    """The coefficients without an axis, as a table of derivatives: coefficient, value, stderr, file, row."""
+    errors = np.sqrt(np.diag(found.covariance))
+    every = zip(found.nodes, found.values, errors, strict=True)
+    own = [(n.name, v, e) for n, v, e in every if not n.point and n.part == "hull"]
+    table = pd.DataFrame(own, columns=["coefficient", "value", "stderr"])
+    return table.assign(file="identified coefficients", row=table.index + 1)
+
+
+def refuse_errors(folder: Path, findings: list[Finding]) -> None:
+    """Stop at the first finding of severity ``error``.
+
+    Raises
+    ------
+    InputError
+        Naming file, row and column, what was found and the remedy.
+    """
+    errors = [f for f in findings if f.severity == "error"]
+    if not errors:
+        return
+    first, more = errors[0], len(errors) - 1
+    place = f"{folder / first.file}" + (f", row {first.shown_rows}" if first.rows else "")
+    place += f", column {' '.join(first.columns)}" if first.columns else ""
+    rest = f"; {more} more, see ident check {folder}" if more else ""
+    raise InputError(place, f"{first.what} (check {first.check})", first.remedy + rest)
+
+
+def table(findings: list[Finding], title: str) -> Table:
+    """The findings as a table for the screen."""
+    from rich.markup import escape
+    from rich.table import Table
+
+    shown = Table(title=escape(title), title_justify="left", show_lines=True)
+    shown.add_column("severity")
+    shown.add_column("check")
+    shown.add_column("where")
+    shown.add_column("what", ratio=3)
+    shown.add_column("remedy", ratio=2)
+    for f in findings:
+        colour = _COLOURS[f.severity]
+        rows = f"\nrow {f.shown_rows}" if f.rows else ""
+        where = f"{f.file}{rows}" + (f"\n{' '.join(f.columns)}" if f.columns else "")
+        shown.add_row(f"[{colour}]{f.severity}[/]", f.check, escape(where), escape(f.what), escape(f.remedy))
+    return shown
+
+
+def show(findings: list[Finding], title: str, console: Console) -> None:
+    """Print the findings, or that there are none."""
+    if findings:
+        console.print(table(findings, title))
+    counts = ", ".join(f"{sum(f.severity == s for f in findings)} {s}" for s in reversed(SEVERITIES))
+    console.print(f"quality checks: {counts}", highlight=False)

@@ -1,0 +1,200 @@
+"""Checks for numbers that stand twice: copied runs, columns, blocks and mirror images."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from ident.checks.findings import STATE, Array, Evidence, Finding, Rule, check, declared, kept, milder, spans
+from sim.boat.catalogue import MIRROR_OUTPUT, MIRRORED_FACTORS, OUTPUTS
+from sim.boat.vehicle import Vehicle
+
+# Digits in which two copies agree after they went through a spreadsheet.
+_AGREE = 6
+# Smaller numbers have no six digits left.
+_NOTHING = 1e-290
+
+
+def digits(values: Array) -> NDArray[np.int64]:
+    """Significant digits numbers are written with, up to ten; 0 for zero and NaN."""
+    texts = [f"{abs(v):.9e}" if np.isfinite(v) else "0" for v in np.ravel(values)]
+    counts = [len(t.split("e")[0].replace(".", "").strip("0")) for t in texts]
+    return np.array(counts, dtype=int).reshape(np.shape(values))
+
+
+def _rounded(values: Array) -> Array:
+    """Numbers to six significant digits; NaN counts as zero."""
+    finite = np.where(np.abs(np.nan_to_num(values)) > _NOTHING, np.nan_to_num(values), 0.0)
+    size = np.where(finite == 0.0, 1.0, np.abs(finite))
+    unit = 10.0 ** (np.floor(np.log10(size)) - (_AGREE - 1))
+    return np.round(finite / unit) * unit + 0.0
+
+
+def _hashed(table: pd.DataFrame) -> pd.Series:
+    """One number a row; equal rows have equal numbers."""
+    return pd.util.hash_pandas_object(table, index=False)
+
+
+def mirror_image(runs: pd.DataFrame, vehicle: Vehicle | None) -> pd.DataFrame:
+    """The same runs seen in the port/starboard mirror: states, loads and parts.
+
+    Parameters
+    ----------
+    runs : Run table.
+    vehicle : For the partner of a plane and the sense of its deflection.
+    """
+    image = runs.copy()
+    odd = [c for c in STATE if c == "beta" or c in MIRRORED_FACTORS]
+    image[odd] = -image[odd]
+    for output, sign in MIRROR_OUTPUT.items():
+        image[output] = sign * image[output]
+    planes = {p.name: p for p in vehicle.planes} if vehicle else {}
+    for name, plane in planes.items():
+        own = runs["part"] == name
+        partner = planes[plane.mirror]
+        turned = float((plane.lift_axis * np.array([1.0, -1.0, 1.0])) @ partner.lift_axis)
+        image.loc[own, "plane"] *= 1.0 if turned > 0.0 else -1.0
+        image.loc[own, "part"] = plane.mirror
+    return image
+
+
+def mirror_known(runs: pd.DataFrame, vehicle: Vehicle | None) -> pd.Series:
+    """True where the mirror image of a run's state is known.
+
+    A deflection that stands beside another part than a plane may be that of a rudder, which
+    the mirror reverses, or of an elevator, which it does not.
+    """
+    planes = [p.name for p in vehicle.planes] if vehicle else []
+    return (runs["plane"].fillna(0.0) == 0.0) | runs["part"].isin(planes)
+
+
+def state_key(runs: pd.DataFrame) -> pd.Series:
+    """A state and its part as a number: equal states have equal keys; a missing motion is zero."""
+    table = pd.DataFrame(_rounded(runs[list(STATE)].to_numpy(float)), columns=list(STATE), index=runs.index)
+    return _hashed(table.assign(part=runs["part"]))
+
+
+def load_key(runs: pd.DataFrame, rule: Rule) -> pd.Series:
+    """The loads of a run as a number; 0 when too few digits could tell a copy from chance."""
+    loads = runs[list(OUTPUTS)].to_numpy(float)
+    table = pd.DataFrame(_rounded(loads), columns=list(OUTPUTS), index=runs.index)
+    sharp = (digits(loads) >= int(rule.limits["digits"])).sum(axis=1) >= int(rule.limits["loads"])
+    return _hashed(table).where(sharp, 0)
+
+
+def _again(runs: pd.DataFrame, key: pd.Series) -> Iterator[tuple[Any, pd.DataFrame]]:
+    """Groups of runs that share a key other than 0, two or more in each."""
+    shared = (key != 0) & key.duplicated(keep=False)
+    yield from runs[shared].groupby(key[shared], sort=False)
+
+
+def _independent(runs: pd.DataFrame) -> pd.DataFrame:
+    """Runs that do not say they are copies."""
+    return runs[runs["copy_of"] == ""]
+
+
+def _differences(group: pd.DataFrame) -> str:
+    """Which states differ within a group, with their values."""
+    found = []
+    for column in STATE:
+        values = sorted(set(group[column].dropna()))
+        if len(values) > 1:
+            shown = np.rad2deg(values) if column in ("alpha", "beta", "plane") else values
+            unit = " deg" if column in ("alpha", "beta", "plane") else ""
+            found.append(f"{column} = {' and '.join(f'{v:.4g}' for v in shown)}{unit}")
+    parts = sorted(set(group["part"]))
+    return ", ".join(found + ([f"parts {' and '.join(parts)}"] if len(parts) > 1 else []))
+
+
+@check("duplicates")
+def duplicates(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
+    """Every load of a run again, under another state."""
+    runs = _independent(evidence.runs)
+    states = state_key(runs)
+    places: dict[tuple[str, str, bool], list[pd.DataFrame]] = {}
+    for _, group in _again(runs, load_key(runs, rule)):
+        if states[group.index].nunique() < 2:
+            continue
+        known = bool((~declared(evidence, group)).sum() <= 1)
+        for file in dict.fromkeys(group["file"]):
+            places.setdefault((str(file), _differences(group), known), []).append(group)
+    for (file, difference, known), groups in places.items():
+        table = pd.concat(groups)
+        names = " = ".join(dict.fromkeys(groups[0]["run_id"]))
+        more = f" and {len(groups) - 1} more" if len(groups) > 1 else ""
+        columns = [o for o in OUTPUTS if table[o].notna().any()]
+        what = f"run {names}{more}: all loads the same under {difference}"
+        yield rule.finding(file, table.loc[table["file"] == file, "row"], columns, what, milder(rule, known))
+
+
+@check("repeated_blocks")
+def repeated_blocks(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
+    """The same runs, state and loads, in two places."""
+    runs = _independent(evidence.runs)
+    loads = load_key(runs, rule)
+    both = _hashed(pd.DataFrame({"loads": loads, "state": state_key(runs)})).where(loads != 0, 0)
+    blocks: dict[tuple[str, str, str, str], list[tuple[int, int]]] = {}
+    for _, group in _again(runs, both):
+        first = group.iloc[0]
+        for _, again in group.iloc[1:].iterrows():
+            place = (first["file"], first["test"], again["file"], again["test"])
+            blocks.setdefault(place, []).append((int(first["row"]), int(again["row"])))
+    for (file, test, other, block), pairs in blocks.items():
+        count = f"{len(pairs)} runs" if len(pairs) > 1 else "a run"
+        what = f"{count} of {file}, {test} (rows {spans(a for a, _ in pairs)}) again here under {block}"
+        yield rule.finding(other, [b for _, b in pairs], (), what)
+
+
+@check("mirrored_copies")
+def mirrored_copies(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
+    """Runs that are the mirror image of another to the last digit."""
+    runs = _independent(evidence.runs)
+    image = mirror_image(runs, evidence.vehicle)
+    own, seen = load_key(runs, rule), load_key(image, rule)
+    here = list(zip(own, state_key(runs), strict=True))
+    there = list(zip(seen, state_key(image), strict=True))
+    first = {k: i for i, k in reversed(list(enumerate(here)))}
+    pairs = [(first[k], i) for i, k in enumerate(there) if k[0] and first.get(k, i) < i]
+    for file, group in runs.iloc[[i for _, i in pairs]].groupby("file", sort=False):
+        names = [str(runs["run_id"].iloc[a]) for a, b in pairs if runs["file"].iloc[b] == file]
+        what = f"{len(group)} runs are exact mirror images of others (the first of {names[0]})"
+        yield rule.finding(str(file), group["row"], OUTPUTS, what)
+
+
+@check("frozen_column")
+def frozen_column(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
+    """One load unchanged in runs of different state while the other loads change."""
+    runs = _independent(evidence.runs).copy()
+    odd = [c for c in STATE if c in ("beta", "plane") or c in MIRRORED_FACTORS]
+    runs[odd] = runs[odd].abs()
+    states, whole = state_key(runs), load_key(runs, rule)
+    found: dict[tuple[str, str, bool], list[pd.DataFrame]] = {}
+    for output in OUTPUTS:
+        sharp = digits(runs[output].to_numpy(float)) >= rule.limits["digits"]
+        usable = runs[kept(runs, output) & sharp]
+        key = _hashed(pd.DataFrame({"test": usable["test"], "value": _rounded(usable[output].to_numpy(float))}))
+        for _, group in _again(usable, key):
+            others = group[[o for o in OUTPUTS if o != output]].notna().any(axis=None)
+            same = others and whole[group.index].nunique() == 1
+            if states[group.index].nunique() < 2 or same:
+                continue
+            known = bool((~declared(evidence, group)).sum() <= 1)
+            for file, own in group.groupby("file", sort=False):
+                found.setdefault((str(file), _axes(group), known), []).append(own.assign(output=output))
+    for (file, varies, known), groups in found.items():
+        table = pd.concat(groups)
+        columns = list(dict.fromkeys(table["output"]))
+        what = f"the same to the last digit whatever {varies}: {len(groups)} values of {', '.join(columns)} "
+        yield rule.finding(
+            file, table["row"], columns, what + f"stand in {table['row'].nunique()} runs", milder(rule, known)
+        )
+
+
+def _axes(group: pd.DataFrame) -> str:
+    """Names of the states that differ within a group."""
+    names = [c for c in STATE if group[c].dropna().nunique() > 1]
+    return ", ".join(names + (["part"] if group["part"].nunique() > 1 else []))

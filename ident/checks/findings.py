@@ -1,0 +1,244 @@
+"""What a quality check is: its rule in ``data/checks.csv``, its evidence, its findings."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
+from functools import cache
+from importlib.resources import files
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from sim.boat.catalogue import ACCELERATIONS, OUTPUTS
+
+if TYPE_CHECKING:
+    from ident.captive.campaign import Campaign
+    from ident.captive.histories import Reduced
+    from sim.boat.vehicle import Vehicle
+
+Array = NDArray[np.float64]
+SEVERITIES = ("info", "warning", "error")
+DIRECT = ("KT", "KQ", "t")
+STATE = ("U", "alpha", "beta", "D0", "plane", "n", "J", "p", "q", "r", *ACCELERATIONS)
+_TEXT = ("run_id", "test", "part", "quality", "copy_of", "exclude", "file")
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing a check found.
+
+    Attributes
+    ----------
+    check : Name of the check.
+    severity : ``info``, ``warning`` or ``error``.
+    file : File it stands in.
+    rows : Rows of that file, the header being row 1; empty when it concerns the whole file.
+    columns : Columns concerned.
+    what : What was found, with numbers.
+    remedy : What to do.
+    """
+
+    check: str
+    severity: str
+    file: str
+    rows: tuple[int, ...]
+    columns: tuple[str, ...]
+    what: str
+    remedy: str
+
+    def as_json(self) -> dict[str, Any]:
+        """The finding for a program to read."""
+        return asdict(self) | {"rows": list(self.rows), "columns": list(self.columns)}
+
+    def with_words(self, more: str) -> Finding:
+        """The same finding with words added to what was found."""
+        return replace(self, what=self.what + more)
+
+    @property
+    def shown_rows(self) -> str:
+        """Rows as ``2-5, 9``."""
+        return spans(self.rows)
+
+
+def spans(rows: Iterable[int]) -> str:
+    """Row numbers as ``2-5, 9``."""
+    found: list[list[int]] = []
+    for row in sorted(set(rows)):
+        if found and row == found[-1][1] + 1:
+            found[-1][1] = row
+        else:
+            found.append([row, row])
+    return ", ".join(f"{a}-{b}" if b > a else str(a) for a, b in found)
+
+
+@dataclass(frozen=True)
+class Rule:
+    """One row of ``data/checks.csv``: severity, limits with their basis, remedy."""
+
+    name: str
+    title: str
+    severity: str
+    limits: dict[str, float]
+    finds: str
+    remedy: str
+    basis: str
+
+    def finding(
+        self,
+        file: str,
+        rows: Iterable[int],
+        columns: Sequence[str],
+        what: str,
+        severity: str = "",
+    ) -> Finding:
+        """A finding of this check, with the rule's severity unless another is given."""
+        places = tuple(sorted({int(r) for r in rows}))
+        return Finding(self.name, severity or self.severity, file, places, tuple(columns), what, self.remedy)
+
+
+@cache
+def rules() -> dict[str, Rule]:
+    """Every check by name, from ``data/checks.csv``: the one list of checks."""
+    with (files("ident") / "data" / "checks.csv").open(encoding="utf-8") as stream:
+        rows = list(csv.DictReader(stream))
+    return {r["check"]: Rule(r["check"], r["title"], r["severity"], _limits(r), *_texts(r)) for r in rows}
+
+
+def _limits(row: dict[str, str]) -> dict[str, float]:
+    return {k: float(v) for k, v in (item.split(":") for item in row["limits"].split())}
+
+
+def _texts(row: dict[str, str]) -> tuple[str, str, str]:
+    return row["finds"], row["remedy"], row["basis"]
+
+
+@dataclass(frozen=True)
+class Body:
+    """The tested body, at the scale of the run table.
+
+    Attributes
+    ----------
+    length : Reference length L [m].
+    density : Water density [kg/m^3].
+    mass : Displaced mass [kg].
+    inertia : Moments of inertia about x, y, z [kg m^2].
+    draught : d [m] of a norm 1/2 rho L d; None for a submarine.
+    file : File that states them.
+    """
+
+    length: float
+    density: float
+    mass: float | None = None
+    inertia: tuple[float, float, float] | None = None
+    draught: float | None = None
+    file: str = ""
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """What checks look at; a check whose evidence is missing finds nothing.
+
+    Attributes
+    ----------
+    runs : Run table as of ``Campaign.runs``; see ``run_table`` for a table of your own.
+    body : The tested body.
+    vehicle : For planes, their mirror and their position.
+    campaign : The whole campaign, when the runs are one.
+    derivatives, reference : Columns coefficient, value, file, row; the second in the norm
+        the first claims.
+    labels : Columns sheet, column, description, file, row.
+    configurations : Columns configuration, appendages, file, row.
+    times : File or column name -> time stamps [s].
+    histories : Reduced time histories, with their clocks and verdicts.
+    tested_length : Length of the body the loads were measured on, at the body's scale [m].
+    memo : What two checks share, by name.
+    """
+
+    runs: pd.DataFrame = field(default_factory=lambda: run_table({}))
+    body: Body | None = None
+    vehicle: Vehicle | None = None
+    campaign: Campaign | None = None
+    derivatives: pd.DataFrame | None = None
+    reference: pd.DataFrame | None = None
+    labels: pd.DataFrame | None = None
+    configurations: pd.DataFrame | None = None
+    times: Mapping[str, Array] = field(default_factory=dict)
+    histories: tuple[Reduced, ...] = ()
+    tested_length: float | None = None
+    memo: dict[str, pd.DataFrame] = field(default_factory=dict, repr=False)
+
+
+Function = Callable[[Evidence, Rule], Iterable[Finding]]
+_FUNCTIONS: dict[str, Function] = {}
+
+
+def check(name: str) -> Callable[[Function], Function]:
+    """Register a function for a row of ``data/checks.csv``; one check may have several."""
+    if name not in rules():
+        raise KeyError(f"data/checks.csv has no check {name!r}")
+
+    def enter(function: Function) -> Function:
+        _FUNCTIONS[f"{name}.{function.__name__}"] = function
+        return function
+
+    return enter
+
+
+def registered() -> dict[str, list[Function]]:
+    """The functions of every check, in the order of ``data/checks.csv``."""
+    return {name: [f for k, f in _FUNCTIONS.items() if k.split(".")[0] == name] for name in rules()}
+
+
+def run_table(columns: Mapping[str, Any]) -> pd.DataFrame:
+    """A table of your own runs with every column the checks read.
+
+    Parameters
+    ----------
+    columns : As in ``Campaign.runs``: SI, radians, program frame. Missing states and loads
+        are NaN, missing texts empty, ``row`` counts from 2.
+    """
+    table = pd.DataFrame(dict(columns))
+    for name in (*STATE, *OUTPUTS, *DIRECT, "rel_sigma", *(f"s_{o}" for o in (*OUTPUTS, *DIRECT))):
+        table[name] = pd.to_numeric(table[name]).astype(float) if name in table else np.nan
+    for name in _TEXT:
+        table[name] = table[name].astype(str) if name in table else ""
+    if "row" not in table:
+        table["row"] = np.arange(len(table)) + 2
+    return table.reset_index(drop=True)
+
+
+def dynamic(runs: pd.DataFrame, body: Body) -> pd.Series:
+    """1/2 rho (U^2 + (Omega L)^2) L^2 [N] of every run; NaN for a body at rest."""
+    rate2 = sum(runs[c].fillna(0.0) ** 2 for c in ("p", "q", "r"))
+    found = 0.5 * body.density * body.length**2 * (runs["U"].fillna(0.0) ** 2 + rate2 * body.length**2)
+    return found.where(found > 0.0)
+
+
+def prime(runs: pd.DataFrame, output: str, body: Body) -> pd.Series:
+    """Dimensionless load of every run: forces over ``dynamic``, moments over that times L."""
+    return runs[output] / dynamic(runs, body) / (1.0 if output in "XYZ" else body.length)
+
+
+def kept(runs: pd.DataFrame, output: str) -> pd.Series:
+    """True where a load is given and not excluded by the campaign."""
+    return runs[output].notna() & ~runs["exclude"].map(lambda text: output in text.split()).astype(bool)
+
+
+def factors(evidence: Evidence, runs: pd.DataFrame) -> pd.Series:
+    """Factor that the campaign's quality word puts on the standard error of each run."""
+    known = evidence.campaign.header.quality if evidence.campaign else {}
+    return runs["quality"].map({k: q.factor for k, q in known.items()}).astype(float).fillna(1.0)
+
+
+def declared(evidence: Evidence, runs: pd.DataFrame) -> pd.Series:
+    """True for runs that the campaign itself already trusts less."""
+    return factors(evidence, runs) > 1.0
+
+
+def milder(rule: Rule, known: bool) -> str:
+    """The rule's severity, one step less when the campaign already says so."""
+    return SEVERITIES[max(SEVERITIES.index(rule.severity) - 1, 0)] if known else rule.severity

@@ -1,0 +1,110 @@
+"""Checks of time histories: their time stamps, and whether they had settled."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ident.checks.copies import digits
+from ident.checks.findings import Array, Evidence, Finding, Rule, check, declared, milder, rules
+from ident.timeseries.clock import Clock
+
+if TYPE_CHECKING:
+    from ident.captive.histories import Reduced
+
+
+@check("time")
+def clocks(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
+    """Every time column of the evidence."""
+    for name, time in evidence.times.items():
+        yield from time_stamps(np.asarray(time, dtype=float), name, rule)
+
+
+@check("time")
+def replaced_clocks(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
+    """Stamps that ``rate_hz`` of the campaign stands in for, and whether it fits them.
+
+    Stamps that do not rise and that nothing stands in for are those of ``refused_clocks``.
+    """
+    seen: set[str] = set()
+    for one in evidence.histories:
+        if one.clock is None or one.rate_hz is None or one.file in seen:
+            continue
+        seen.add(one.file)
+        for found in faults(one.clock, one.file, rule, one.first_row, "info"):
+            yield found.with_words("; rate_hz of the campaign stands in for the stamps")
+        yield from _rate(one, one.clock, one.rate_hz, rule)
+
+
+@check("time")
+def refused_clocks(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
+    """Histories that were not reduced because their stamps do not rise and nothing stands in for them."""
+    for one in evidence.campaign.refused if evidence.campaign else ():
+        for found in faults(one.clock, one.file, rule, one.first_row):
+            yield found.with_words(f"; not reduced, and refused by ident fit (allowed: {one.allowed})")
+
+
+def _rate(one: Reduced, clock: Clock, rate_hz: float, rule: Rule) -> Iterator[Finding]:
+    """A sampling rate that makes the record another length than its stamps say."""
+    span, stated = clock.last - clock.first, (clock.samples - 1) / rate_hz
+    # Stamps are no better than their longest step, at both ends.
+    if abs(span - stated) > rule.limits["rate"] * max(span, stated) + 2.0 * clock.longest:
+        what = f"rate_hz = {rate_hz:g} makes {clock.samples} rows a record of {stated:.4g} s, "
+        what += f"the time stamps span {span:.4g} s"
+        yield rule.finding(one.file, [], ["time"], what)
+
+
+def time_stamps(time: Array, file: str, rule: Rule | None = None, first_row: int = 2) -> Iterator[Finding]:
+    """Stamps that are not finite, repeat or step back.
+
+    Parameters
+    ----------
+    time : Stamps in the order of the file [s].
+    file, first_row : File, and its row of the first stamp.
+    rule : The row of ``data/checks.csv``; looked up when None.
+    """
+    clock = Clock()
+    clock.feed(np.asarray(time, dtype=float))
+    yield from faults(clock, file, rule or rules()["time"], first_row)
+
+
+def faults(clock: Clock, file: str, rule: Rule, first_row: int, severity: str = "") -> Iterator[Finding]:
+    """What is wrong with the stamps a clock was fed.
+
+    Parameters
+    ----------
+    clock : From a reader.
+    file, first_row : File, and its row of the first stamp.
+    rule : The row of ``data/checks.csv``.
+    severity : Instead of the rule's own.
+    """
+    if clock.bads:
+        rows = [k + first_row for k in clock.bad]
+        yield rule.finding(file, rows, ["time"], f"{clock.bads} time stamps are not finite numbers", severity)
+    if clock.backs:
+        a, b = clock.at_back
+        text = f"time steps back {clock.backs} times, first from {a:g} s to {b:g} s"
+        yield rule.finding(file, [k + first_row for k in clock.back], ["time"], text, severity)
+    if clock.repeats:
+        text = f"{clock.repeats} time stamps repeat the one before, from {clock.at_repeat:g} s on"
+        shown = int(digits(clock.around).max())
+        few = shown <= rule.limits["digits"]
+        text += f": the column is printed with {shown} significant digits" if few else ""
+        yield rule.finding(file, [k + first_row for k in clock.repeat], ["time"], text, severity)
+
+
+@check("convergence")
+def unsettled(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
+    """Histories whose reduction did not converge, one finding a file."""
+    files: dict[str, list[Reduced]] = {}
+    for one in evidence.histories:
+        if not one.fit.converged:
+            files.setdefault(one.file, []).append(one)
+    for file, group in files.items():
+        words = [f"run {one.run_id}, {one.fit.start:g}-{one.fit.end:g} s: {one.fit.verdict}" for one in group]
+        channels = dict.fromkeys(w.split(":")[0] for one in group for w in one.fit.verdict.split("; ") if ":" in w)
+        own = evidence.runs["run_id"].isin([name for one in group for name in one.runs])
+        known = bool(own.any() and declared(evidence, evidence.runs[own]).all())
+        yield rule.finding(file, [], list(channels), "; ".join(words), milder(rule, known))

@@ -1,0 +1,260 @@
+"""Checks of runs against physics: sizes, levers, inertia, scale, propeller curves."""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Iterator
+from functools import cache
+from importlib.resources import files
+
+import numpy as np
+import pandas as pd
+
+from ident.checks.findings import Body, Evidence, Finding, Rule, check, declared, kept, milder, prime
+from sim.boat.catalogue import ACCELERATIONS, OUTPUTS
+
+# Load component that answers each acceleration, and the moment of each cross force.
+_ANSWERS = dict(zip(ACCELERATIONS, OUTPUTS, strict=True))
+_IN_PLANE = {"drift_horizontal": ("beta", "Y", "N", 1.0), "drift_vertical": ("alpha", "Z", "M", -1.0)}
+
+
+@cache
+def _sizes() -> list[dict[str, str]]:
+    with (files("ident") / "data" / "prime_sizes.csv").open(encoding="utf-8") as stream:
+        return list(csv.DictReader(stream))
+
+
+def _slope(runs: pd.DataFrame, over: str, output: str, body: Body) -> float:
+    """Least-squares slope of a dimensionless load over an angle [1/rad]; NaN without three angles."""
+    y = prime(runs, output, body).where(kept(runs, output))
+    x = runs[over].where(y.notna())
+    if x.nunique() < 3:
+        return math.nan
+    x, y = x - x.mean(), y - y.mean()
+    return float((x * y).sum() / (x * x).sum())
+
+
+@check("size")
+def prime_sizes(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
+    """Dimensionless resistance and slopes over the flow angles, file by file."""
+    body = evidence.body
+    if body is None:
+        return
+    for size in _sizes():
+        runs = evidence.runs[(evidence.runs["test"] == size["test"]) & evidence.runs["part"].isin(["", "hull"])]
+        low, high, output = float(size["low"]), float(size["high"]), size["output"]
+        for file, group in runs.groupby("file", sort=False):
+            values = prime(group, output, body).where(kept(group, output))
+            value = _slope(group, size["over"], output, body) if size["over"] else float(values.median())
+            value = abs(value)
+            if not value > 0.0 or low <= value <= high:
+                continue
+            powers = [10.0**p for p in range(-4, 5) if p and low <= value / 10.0**p <= high]
+            off = f"; {' or '.join(f'{p:g}' for p in powers)} times too large would be in it" if powers else ""
+            what = f"{size['quantity']} is {value:.3g}, boats and ships have {low:g} to {high:g}{off}"
+            yield rule.finding(str(file), [], [output], what)
+
+
+# -- levers ------------------------------------------------------------------------------
+
+
+@check("levers")
+def plane_levers(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
+    """Moments of a plane or propeller against its forces and where it is."""
+    body, vehicle = evidence.body, evidence.vehicle
+    if body is None or vehicle is None:
+        return
+    places = {p.name: np.asarray(p.position) for p in vehicle.planes}
+    for (part, file), group in evidence.runs.groupby(["part", "file"], sort=False):
+        if part not in places:
+            continue
+        forces = group[["X", "Y", "Z"]].fillna(0.0).to_numpy()
+        moments = group[["K", "M", "N"]].to_numpy()
+        wrong = np.abs(moments - np.cross(places[str(part)], forces))
+        allowed = rule.limits["share"] * body.length * np.linalg.norm(forces, axis=1)
+        given = np.column_stack([kept(group, o) for o in "KMN"])
+        bad = given & (wrong > allowed[:, None]) & (moments != 0.0)
+        if bad.any():
+            row, column = np.unravel_index(int(np.where(bad, wrong / allowed[:, None], 0.0).argmax()), bad.shape)
+            name = "KMN"[column]
+            what = f"{name} = {moments[row, column]:.4g} of run {group['run_id'].iloc[row]}, but force and place of "
+            expected = np.cross(places[str(part)], forces)[row, column]
+            what += f"{part} give {expected:.4g}; {int(bad.any(axis=1).sum())} of {len(group)} runs"
+            columns = [o for o, any_ in zip("KMN", bad.any(axis=0), strict=True) if any_]
+            known = bool(declared(evidence, group[bad.any(axis=1)]).all())
+            yield rule.finding(str(file), group["row"][bad.any(axis=1)], columns, what, milder(rule, known))
+
+
+@check("levers")
+def hull_levers(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
+    """Hull moments against lift on the hull plus the Munk moment; propeller levers."""
+    body = evidence.body
+    if body is None:
+        return
+    runs = evidence.runs
+    mass = body.mass if body.mass is not None else math.inf
+    for moment, force, angle in (("N", "Y", "beta"), ("M", "Z", "alpha")):
+        still = (runs[["p", "q", "r", *ACCELERATIONS]].fillna(0.0) == 0.0).all(axis=1)
+        hull = runs["part"].isin(["hull", ""]) & (
+            runs["test"] == f"drift_{'horizontal' if angle == 'beta' else 'vertical'}"
+        )
+        swung = 0.5 * mass * runs["U"] ** 2 * np.sin(2.0 * runs[angle].fillna(0.0)).abs()
+        largest = rule.limits["hull"] * body.length * runs[force].abs() + rule.limits["munk"] * swung
+        floor = (
+            rule.limits["share"]
+            * body.length
+            * runs.groupby(["file", "test"])[force].transform(lambda loads: loads.abs().max())
+        )
+        propeller = runs["part"] == "propeller"
+        beyond = runs[moment].abs() > np.where(
+            propeller, rule.limits["hull"] * body.length * runs[force].abs(), largest + floor
+        )
+        bad = beyond & kept(runs, moment) & kept(runs, force) & ((hull & still) | propeller)
+        for file, group in runs[bad].groupby("file", sort=False):
+            first = group.iloc[0]
+            lever = first[moment] / first[force] if first[force] else math.inf
+            what = (
+                f"{moment} = {first[moment]:.4g} with {force} = {first[force]:.4g} in run {first['run_id']}: a lever "
+            )
+            what += f"of {abs(lever):.3g} m on a body of {body.length:g} m, more than its Munk moment explains"
+            yield rule.finding(str(file), group["row"], [moment, force], what)
+
+
+@check("levers")
+def section_levers(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
+    """Levers of sections in the runs against those of the vehicle file."""
+    if evidence.campaign is None:
+        return
+    from ident.identification.identify import Solver, check_levers
+
+    solver = Solver(evidence.campaign)
+    check_levers(solver)
+    runs = evidence.runs
+    for name, text in solver.warnings:
+        own = runs[runs["run_id"] == name]
+        yield rule.finding(str(own["file"].iloc[0]), own["row"], ["x", "y", "z"], text)
+
+
+@check("angle_name")
+def drift_or_rudder(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
+    """A drift angle whose load acts where only a stern plane's does."""
+    body = evidence.body
+    if body is None:
+        return
+    for test, (angle, force, moment, sense) in _IN_PLANE.items():
+        runs = evidence.runs[(evidence.runs["test"] == test) & evidence.runs["part"].isin(["hull", ""])]
+        for file, group in runs.groupby("file", sort=False):
+            lift = _slope(group, angle, force, body)
+            lever = sense * _slope(group, angle, moment, body) / lift if lift else math.nan
+            if rule.limits["stern"] < lever < rule.limits["aft"]:
+                what = f"{force} over {angle} acts at x = {lever:.2f} L, where a stern plane is: "
+                what += f"is {angle} the plane angle?"
+                yield rule.finding(str(file), group["row"], [angle], what)
+
+
+# -- inertia -----------------------------------------------------------------------------
+
+
+def _apparent(evidence: Evidence) -> Iterator[tuple[str, str, pd.DataFrame, float]]:
+    """File, acceleration, runs and apparent added inertia -load/acceleration of the whole body.
+
+    Loads of parts in one state are added; least squares through the origin over the
+    accelerations, with every run of its file accelerated along one axis only.
+    """
+    runs = evidence.runs
+    moving = runs[list(ACCELERATIONS)].fillna(0.0) != 0.0
+    for acceleration, output in _ANSWERS.items():
+        alone = moving[acceleration] & (moving.sum(axis=1) == 1) & kept(runs, output)
+        for file, group in runs[alone].groupby("file", sort=False):
+            whole = group.groupby([acceleration, group["D0"].fillna(0.0)]).agg({output: "sum"}).reset_index()
+            whole = whole if group["part"].nunique() > 1 else group
+            x, y = whole[acceleration].to_numpy(float), whole[output].to_numpy(float)
+            if not x @ x > 0.0:
+                continue
+            yield str(file), acceleration, group, -float(x @ y / (x @ x))
+
+
+@check("inertia_sign")
+def loads_along_acceleration(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
+    """Acceleration tests whose load pushes along the acceleration."""
+    for file, acceleration, group, inertia in _apparent(evidence):
+        output = _ANSWERS[acceleration]
+        single = group[(group[output] * group[acceleration] > 0.0) & (group["part"].nunique() == 1)]
+        if inertia < 0.0:
+            what = f"{output} goes with {acceleration}: an added inertia of {inertia:.4g}, below zero"
+            yield rule.finding(file, group["row"], [output, acceleration], what)
+        elif not single.empty:
+            what = f"{output} pushes along {acceleration} in run {single['run_id'].iloc[0]}, against the other runs"
+            yield rule.finding(file, single["row"], [output, acceleration], what)
+
+
+@check("inertia_left_in")
+def mass_in_the_loads(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
+    """Apparent added inertia near that of body plus water."""
+    body = evidence.body
+    if body is None or body.mass is None:
+        return
+    inertia = body.inertia or (math.nan,) * 3
+    own = dict(zip(ACCELERATIONS, (*(body.mass,) * 3, *inertia), strict=True))
+    for file, acceleration, group, found in _apparent(evidence):
+        ratio = found / own[acceleration]
+        if not ratio > rule.limits[acceleration[0]]:
+            continue
+        output, rest = _ANSWERS[acceleration], ratio - 1.0
+        kind = "mass" if acceleration[0] in "uvw" else "moment of inertia"
+        what = f"{output} over {acceleration} is {ratio:.2f} of the body's own {kind}; "
+        if (
+            rest >= (rule.limits["least"] if acceleration[0] in "vwqr" else 0.0)
+            and rest <= rule.limits[acceleration[0]]
+        ):
+            what += (
+                f"with it subtracted {rest:.2f} is left, as for added inertia: the model's own inertia is in the load"
+            )
+        else:
+            what += "no slender body has that added inertia: scale, unit or inertia of the rig?"
+        yield rule.finding(file, group["row"], [output, acceleration], what)
+
+
+@check("scale")
+def one_length(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
+    """Tested length at full scale against the vehicle's."""
+    body, tested = evidence.body, evidence.tested_length
+    if body is None or tested is None or abs(tested / body.length - 1.0) <= rule.limits["share"]:
+        return
+    ratio = tested / body.length
+    forces, moments = ratio**2, ratio**3
+    what = f"loads of a body of {tested:.5g} m, particulars of one of {body.length:.5g} m: "
+    what += f"dimensionless forces off by a factor {forces:.3g}, moments by {moments:.3g}, masses by {moments:.3g}"
+    yield rule.finding(body.file, [], ["length"], what)
+
+
+# -- propeller ---------------------------------------------------------------------------
+
+
+def _plausible(j: np.ndarray, kt: np.ndarray, kq: np.ndarray, rule: Rule) -> bool:
+    """True for KT and KQ a propeller can have: KT at the lowest J and the best efficiency."""
+    efficiency = float(np.max(j * kt / (2.0 * np.pi * kq)))
+    low = rule.limits["kt_low"] <= kt[int(np.argmin(j))] <= rule.limits["kt_high"]
+    return bool(low and rule.limits["eta_low"] <= efficiency <= rule.limits["eta_high"])
+
+
+@check("open_water")
+def propeller_factors(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
+    """KT and KQ against bollard thrust and efficiency, with factors of ten that would mend them."""
+    runs = evidence.runs
+    curve = runs[runs["J"].notna() & (runs["KT"] > 0.0) & (runs["KQ"] > 0.0)]
+    for file, group in curve.groupby("file", sort=False):
+        j, kt, kq = (group[c].to_numpy(float) for c in ("J", "KT", "KQ"))
+        if group["J"].max() <= 0.0 or _plausible(j, kt, kq, rule):
+            continue
+        powers = [(a, b) for a in range(-1, 4) for b in range(-1, 4) if _plausible(j, kt / 10.0**a, kq / 10.0**b, rule)]
+        best = float(np.max(j * kt / (2.0 * np.pi * kq)))
+        what = f"KT = {kt[int(np.argmin(j))]:.4g} at J = {j.min():g}, best efficiency {best:.2g}"
+        if powers:
+            a, b = min(powers, key=lambda p: abs(p[0]) + abs(p[1]))
+            names = [f"{n} x {10.0**p:g}" for n, p in (("KT", a), ("KQ", b)) if p]
+            what += f": the columns are {' and '.join(names)}"
+        else:
+            what += ": no propeller, whatever power of ten is taken out"
+        yield rule.finding(str(file), group["row"], ["KT", "KQ"], what)

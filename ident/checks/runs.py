@@ -1,0 +1,339 @@
+"""Checks of runs against each other: symmetry, outliers and factors of ten."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from ident.checks.copies import mirror_image, mirror_known, state_key
+from ident.checks.findings import (
+    Array,
+    Evidence,
+    Finding,
+    Rule,
+    check,
+    declared,
+    dynamic,
+    factors,
+    kept,
+    milder,
+    prime,
+    rules,
+)
+from sim.boat.catalogue import MIRROR_OUTPUT, OUTPUTS
+
+# Axes along which a load is smooth; angles and rates also bend (stall), and do so in
+# every series alike.
+_AXES = ("alpha", "beta", "plane", "D0", "U", "p", "q", "r")
+_LOGARITHMIC = ("D0", "U")
+_BENDING = ("alpha", "beta", "plane", "p", "q", "r")
+_ODD = [o for o, sign in MIRROR_OUTPUT.items() if sign < 0]
+# Normal consistency of the median absolute deviation.
+_MAD = 1.4826
+
+
+# -- symmetry ----------------------------------------------------------------------------
+
+
+@check("symmetry")
+def pairs(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
+    """A run and its port/starboard image, loads of both measured."""
+    if evidence.body is None:
+        return
+    runs = evidence.runs[(evidence.runs["copy_of"] == "") & mirror_known(evidence.runs, evidence.vehicle)]
+    image = mirror_image(runs, evidence.vehicle)
+    there = zip(image["test"], state_key(image), strict=True)
+    at = {place: k for k, place in enumerate(zip(runs["test"], state_key(runs), strict=True))}
+    couples = [(k, at[place]) for k, place in enumerate(there) if at.get(place, k) > k]
+    if not couples:
+        return
+    first, second = np.array(couples).T
+    known = declared(evidence, runs).to_numpy()
+    off, share = _disagreement(evidence, runs, image, first, second)
+    bad = (off > rule.limits["standard_errors"]) & (share > rule.limits["share"])
+    both = pd.DataFrame({"file": runs["file"].to_numpy()[second], "known": known[first] | known[second]})
+    both["parts"] = [" and ".join(dict.fromkeys(runs["part"].iloc[[i, j]])) for i, j in couples]
+    both["many"] = bad.sum(axis=1)
+    for key, group in both[both["many"] > 0].groupby(["file", "parts", "known"], sort=False):
+        file, parts, trusted_less = str(key[0]), str(key[1]), bool(key[2])
+        inside = np.where(bad[group.index], share[group.index], 0.0)
+        k, column = divmod(int(inside.argmax()), len(OUTPUTS))
+        worst = int(group.index[k])
+        names = f"{runs['run_id'].iloc[first[worst]]} and {runs['run_id'].iloc[second[worst]]}"
+        what = f"{parts}: {group['many'].sum()} loads disagree with their mirror image, most {OUTPUTS[column]} of "
+        what += f"{names}, by {100 * inside.max():.0f} % of the largest {OUTPUTS[column]} there"
+        members = runs.iloc[np.unique([first[group.index], second[group.index]])]
+        columns = [OUTPUTS[c] for c in np.flatnonzero(bad[group.index].sum(axis=0))]
+        severity = "info" if trusted_less else rule.severity
+        yield rule.finding(file, members.loc[members["file"] == file, "row"], columns, what, severity)
+
+
+def _disagreement(
+    evidence: Evidence, runs: pd.DataFrame, image: pd.DataFrame, first: NDArray[np.int64], second: NDArray[np.int64]
+) -> tuple[Array, Array]:
+    """(pairs, 6) difference of loads from their image: in standard errors before quality; over the largest there."""
+    given = np.column_stack([kept(runs, o) for o in OUTPUTS])
+    seen, own = (t[list(OUTPUTS)].to_numpy(float) for t in (image, runs))
+    sigma = runs[[f"s_{o}" for o in OUTPUTS]].to_numpy(float) / factors(evidence, runs).to_numpy()[:, None]
+    both = given[first] & given[second]
+    off = np.where(both, np.abs(own[second] - seen[first]), 0.0)
+    scale = dynamic(runs, evidence.body).fillna(1.0) if evidence.body else pd.Series(1.0, index=runs.index)
+    largest = (runs[list(OUTPUTS)].abs().div(scale, axis=0)).groupby([runs["file"], runs["test"]]).transform("max")
+    size = np.where(both, largest.to_numpy()[second] * scale.to_numpy()[second, None], 1.0)
+    spread = np.nan_to_num(np.hypot(sigma[first], sigma[second]))
+    score = np.where(off > 0.0, off / np.where(spread > 0.0, spread, np.nan), 0.0)
+    return np.where(np.isnan(score), np.inf, score), off / np.where(size > 0.0, size, 1.0)
+
+
+@check("symmetry")
+def zero_by_symmetry(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
+    """Y, K and N of a symmetric state must vanish."""
+    if evidence.body is None:
+        return
+    runs = evidence.runs
+    # A state is symmetric when its mirror image is the same state: no drift, roll or yaw, and no
+    # rudder, one plane of a pair, or deflection of unknown sense at an angle.
+    same = state_key(mirror_image(runs, evidence.vehicle)) == state_key(runs)
+    straight = same & mirror_known(runs, evidence.vehicle)
+    for output in _ODD:
+        load = prime(runs, output, evidence.body).abs().where(kept(runs, output))
+        largest = load.groupby([runs["file"], runs["test"]]).transform("max")
+        others = load.where(~straight).groupby([runs["file"], runs["test"]]).transform("max")
+        reference = others.fillna(_across(runs, output, evidence))
+        bad = straight & (load > rule.limits["share"] * reference) & (largest > 0.0)
+        for (file, _), group in runs[bad].groupby(["file", "test"], sort=False):
+            share = (load / reference)[group.index]
+            worst = int(np.argmax(share.to_numpy()))
+            what = f"{output} = {group[output].iloc[worst]:.4g} in a symmetric state, run {group['run_id'].iloc[worst]}"
+            size = f"{100 * share.iloc[worst]:.0f} % of the largest {output} there"
+            known = bool(declared(evidence, group).all())
+            yield rule.finding(str(file), group["row"], [output], f"{what}, {size}", milder(rule, known))
+
+
+def _across(runs: pd.DataFrame, output: str, evidence: Evidence) -> pd.Series:
+    """Size of the loads that symmetry allows, where a test has no unsymmetric run."""
+    assert evidence.body is not None
+    allowed = ("X", "Z") if output == "Y" else ("M",)
+    sizes = pd.DataFrame({o: prime(runs, o, evidence.body).abs() for o in allowed})
+    return sizes.max(axis=1).groupby([runs["file"], runs["test"]]).transform("max")
+
+
+# -- neighbours --------------------------------------------------------------------------
+
+
+@dataclass
+class Series:
+    """Loads along one axis, all other states the same; mirror images of runs included.
+
+    ``at`` are positions, ``loads`` (points, 6) dimensionless loads, ``owner`` the run of
+    each point.
+    """
+
+    axis: str
+    at: Array
+    loads: Array
+    owner: NDArray[np.int64]
+
+    def local_fits(self, given: NDArray[np.bool_]) -> tuple[Array, Array]:
+        """Weights (points, points) of the fit at each point, and the noise of a deviation.
+
+        Quadratic through the four nearest other runs, straight through fewer; the noise is
+        sqrt(1 + sum of squared weights), NaN where fewer than two others are given.
+        """
+        n = self.at.size
+        weight, noise = np.zeros((n, n)), np.full(n, np.nan)
+        for k in np.flatnonzero(given):
+            others = np.flatnonzero(given & (self.owner != self.owner[k]))
+            near = others[np.argsort(np.abs(self.at[others] - self.at[k]), kind="stable")[:4]]
+            distinct = np.unique(self.at[near].round(9)).size
+            if distinct < 2:
+                continue
+            offset = self.at[near] - self.at[k]
+            basis = np.vander(offset / np.abs(offset).max(), 3 if distinct >= 4 else 2, increasing=True)
+            weight[k, near] = np.linalg.pinv(basis)[0]
+            noise[k] = math.sqrt(1.0 + float(weight[k] @ weight[k]))
+        return weight, noise
+
+
+def _series(evidence: Evidence) -> list[Series]:
+    """Every series of three or more different runs along every axis."""
+    assert evidence.body is not None
+    runs = evidence.runs[evidence.runs["copy_of"] == ""]
+    runs = runs[runs["decoupled"] != "True"] if "decoupled" in runs else runs
+    for output in OUTPUTS:
+        runs = runs.assign(**{output: runs[output].where(kept(runs, output))})
+    known = mirror_known(runs, evidence.vehicle)
+    image = mirror_image(runs[known], evidence.vehicle)
+    table = pd.concat([runs, image], ignore_index=True)
+    owner = np.concatenate([runs.index, image.index])
+    scale = dynamic(table, evidence.body).to_numpy(float)
+    loads = table[list(OUTPUTS)].to_numpy(float) / scale[:, None]
+    loads[:, 3:] /= evidence.body.length
+    first = ~pd.DataFrame({"owner": owner, "state": state_key(table)}).duplicated().to_numpy()
+    found = []
+    for axis in _AXES:
+        at = table[axis].to_numpy(float)
+        usable = first & (np.nan_to_num(at) > 0.0 if axis in _LOGARITHMIC else np.isfinite(scale))
+        at = np.log(np.where(usable, at, 1.0)) if axis in _LOGARITHMIC else np.nan_to_num(at)
+        # Without speed, load over rate squared jumps with the sign of the rate.
+        side = np.where(np.nan_to_num(table["U"]) == 0.0, np.sign(at), 0.0) if axis in "pqr" else np.zeros(at.size)
+        rest = state_key(table.assign(**{axis: 0.0})).to_numpy() ^ pd.util.hash_array(table["test"].to_numpy(object))
+        rest ^= (side + 1.0).astype(np.uint64)
+        for key, count in zip(*np.unique(rest[usable], return_counts=True), strict=True):
+            group = np.flatnonzero(usable & (rest == key)) if count >= 3 else np.zeros(0, dtype=int)
+            if np.unique(owner[group]).size >= 3 and np.unique(at[group].round(9)).size >= 3:
+                found.append(Series(axis, at[group], loads[group], owner[group]))
+    return found
+
+
+def deviations(evidence: Evidence, every: list[Series]) -> pd.DataFrame:
+    """How far each load is from the local fit through its neighbours, along each axis.
+
+    Parameters
+    ----------
+    evidence : Runs and body.
+    every : Their series.
+
+    Returns
+    -------
+    Columns series (position in ``every``), point, owner (index of the run), output, axis,
+    load and fit (dimensionless), noise (of the deviation, in errors of one load), usual
+    (median load of like series here), off (deviation over its noise, less what all like
+    series share here) and scale (one robust standard deviation, at least the run's own
+    standard error before its quality factor).
+    """
+    rows = []
+    for number, series in enumerate(every):
+        stencil = hash(tuple(np.sort(series.at).round(6)))
+        given, fits = np.isfinite(series.loads), {}
+        for output, values, known in zip(OUTPUTS, series.loads.T, given.T, strict=True):
+            if known.tobytes() not in fits:
+                fits[known.tobytes()] = series.local_fits(known)
+            weight, noise = fits[known.tobytes()]
+            fit = weight @ np.where(known, values, 0.0)
+            for k in np.flatnonzero(np.isfinite(noise)):
+                place = (number, k, series.owner[k], output, series.axis, series.at[k].round(6), stencil)
+                rows.append((*place, values[k], fit[k], noise[k]))
+    names = ["series", "point", "owner", "output", "axis", "at", "stencil", "load", "fit", "noise"]
+    table = pd.DataFrame(rows, columns=names)
+    runs = evidence.runs.loc[table["owner"]]
+    kind = [table["output"], table["axis"], pd.Series(runs["test"].to_numpy()), pd.Series(runs["part"].to_numpy())]
+    raw = (table["load"] - table["fit"]) / table["noise"]
+    here = [*kind, table["stencil"], table["at"]]
+    alike = (raw.groupby(here).transform("size") >= 3) & table["axis"].isin(_BENDING)
+    table["usual"] = table["load"].groupby(here).transform("median").where(alike, 0.0)
+    table["off"] = raw - raw.groupby(here).transform("median").where(alike, 0.0)
+    robust = _MAD * table["off"].abs().groupby(kind).transform("median")
+    floor = rules()["outliers"].limits["floor"] * table["load"].abs().groupby(kind).transform("max")
+    table["scale"] = np.maximum(np.maximum(robust, floor), _own_error(evidence, table))
+    return table
+
+
+def _own_error(evidence: Evidence, table: pd.DataFrame) -> Array:
+    """Dimensionless standard error of each run's load before its quality factor."""
+    own = np.zeros(len(table))
+    for output in OUTPUTS:
+        here = (table["output"] == output).to_numpy()
+        runs = evidence.runs.loc[table["owner"][here]]
+        size = runs[output].abs().where(runs[output] != 0.0)
+        relative = (runs[f"s_{output}"] / size / factors(evidence, runs)).fillna(runs["rel_sigma"]).fillna(0.0)
+        own[here] = relative.to_numpy(float) * table["load"][here].abs().to_numpy(float)
+    return own
+
+
+def _culprit(group: pd.DataFrame, series: Series) -> int:
+    """Row of the point without which a series is smoothest.
+
+    A bad point spoils the fits of its neighbours, so the largest deviation may stand beside it.
+    """
+    values = np.full(series.at.size, np.nan)
+    values[group["point"]] = group["load"] - group["usual"]
+    left = {}
+    for row, owner in zip(group.index.to_numpy(), group["owner"], strict=True):
+        given = np.isfinite(values) & (series.owner != owner)
+        weight, noise = series.local_fits(given)
+        judged = np.isfinite(noise)
+        if judged.sum() < 3:
+            return int(group.index.to_numpy()[np.argmax(group["off"].abs().to_numpy())])
+        off = (values - weight @ np.where(given, values, 0.0))[judged] / noise[judged]
+        left[int(row)] = float(np.abs(off).sum() / judged.sum())
+    return int(min(left, key=lambda row: left[row]))
+
+
+def flagged(evidence: Evidence, limit: float) -> pd.DataFrame:
+    """One row for every series and load with a deviation beyond ``limit`` robust deviations.
+
+    Returns
+    -------
+    Columns of ``deviations`` with score (largest of the series) and expected (dimensionless
+    load in line with the neighbours), one row a run, load and axis, the worst first.
+    """
+    key = f"flagged {limit}"
+    if key not in evidence.memo:
+        every = _series(evidence)
+        table = deviations(evidence, every)
+        table["score"] = table["off"].abs() / table["scale"].where(table["scale"] > 0.0)
+        table["expected"] = table["load"] - table["off"] * table["noise"]
+        groups = [table["series"], table["output"]]
+        table["score"] = table["score"].groupby(groups).transform("max")
+        bad = table[table["score"] > limit].groupby(["series", "output"], sort=False)
+        rows = [_culprit(group, every[int(group["series"].iloc[0])]) for _, group in bad]
+        chosen = table.loc[rows].sort_values("score", ascending=False)
+        evidence.memo[key] = chosen.drop_duplicates(["owner", "output", "axis"])
+    return evidence.memo[key].copy()
+
+
+def _decade(row: pd.Series, near: float) -> int:
+    """Power of ten a load is off by, 0 when it is off by something else."""
+    if not np.sign(row["load"]) * np.sign(row["expected"]) > 0.0:
+        return 0
+    power = math.log10(abs(row["load"])) - math.log10(abs(row["expected"]))
+    whole = round(power)
+    return whole if abs(power - whole) <= near and 1 <= abs(whole) <= 3 else 0
+
+
+@check("factor")
+def slipped_points(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
+    """Loads that are a power of ten away from what their neighbours say."""
+    if evidence.body is None:
+        return
+    found = flagged(evidence, rule.limits["deviation"])
+    found["decade"] = np.array([_decade(row, rule.limits["decades"]) for _, row in found.iterrows()], dtype=int)
+    for _, group in found[found["decade"] != 0].groupby(["owner", "decade"], sort=False):
+        worst = group.iloc[0]
+        run, decade = evidence.runs.loc[worst["owner"]], int(worst["decade"])
+        outputs = [o for o in OUTPUTS if o in set(group["output"])]
+        value = run[worst["output"]]
+        what = f"{worst['output']} = {value:.4g} of run {run['run_id']} is {10.0**decade:g} times "
+        what += f"what its neighbours along {worst['axis']} say"
+        yield rule.finding(str(run["file"]), [run["row"]], outputs, what)
+
+
+@check("outliers")
+def out_of_line(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
+    """Loads far from a local fit through their neighbours, and not by a power of ten."""
+    if evidence.body is None:
+        return
+    near = rules()["factor"].limits["decades"]
+    found = flagged(evidence, rule.limits["deviation"])
+    found = found[np.array([_decade(row, near) == 0 for _, row in found.iterrows()], dtype=bool)]
+    runs = evidence.runs.loc[found["owner"]]
+    found = found.assign(file=runs["file"].to_numpy(), known=declared(evidence, runs).to_numpy())
+    for (file, known), group in found.groupby(["file", "known"], sort=False):
+        worst = group.iloc[0]
+        run = evidence.runs.loc[worst["owner"]]
+        outputs = [o for o in OUTPUTS if o in set(group["output"])]
+        ratio = worst["load"] / worst["expected"] if worst["expected"] else math.inf
+        what = f"{worst['output']} of run {run['run_id']} (or of a neighbour) is {ratio:.2g} times a local fit along "
+        what += f"{worst['axis']}, {worst['score']:.1f} robust deviations off"
+        others = sorted(set(evidence.runs.loc[group["owner"], "run_id"]) - {run["run_id"]})
+        what += f"; so are loads of {len(others)} more, {', '.join(others[:4])}" if others else ""
+        what += "; the campaign already trusts them less" if known else ""
+        yield rule.finding(
+            str(file), evidence.runs.loc[group["owner"], "row"], outputs, what, milder(rule, bool(known))
+        )

@@ -1,0 +1,1 @@
+"""Versions written and compared: rows, provenance, differences, exports."""

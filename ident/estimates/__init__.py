@@ -1,0 +1,1 @@
+"""Estimates by named methods, from geometry and the campaign's own runs."""

@@ -1,0 +1,1 @@
+"""A campaign to a committed version."""

@@ -1,0 +1,1 @@
+"""The inverse of the term table: coefficients and their covariance from runs, stage by stage."""

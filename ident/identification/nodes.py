@@ -1,0 +1,73 @@
+"""Tabulated values as unknowns, port/starboard folded onto one side."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from sim.boat.catalogue import Term
+from sim.boat.parts import Point, mirror_of
+from sim.boat.vehicle import Vehicle
+
+
+@dataclass
+class Node:
+    """One unknown tabulated value: coefficient, part, point, and the runs behind it.
+
+    ``seen`` holds the (part, point) where runs stood: this one, its mirror image, or both.
+    ``tests`` names the tests of its runs. ``worst`` is the largest disagreement among the runs, in standard errors.
+    """
+
+    name: str
+    part: str
+    point: Point
+    runs: list[str] = field(default_factory=list)
+    qualities: list[str] = field(default_factory=list)
+    tests: set[str] = field(default_factory=set)
+    worst: float = 0.0
+    seen: set[tuple[str, Point]] = field(default_factory=set)
+
+
+def key_point(values: Sequence[float]) -> Point:
+    """Axis values that compare equal however they were computed."""
+    return tuple(float(f"{v:.12g}") + 0.0 for v in values)
+
+
+def vanishes(term: Term, part: str, vehicle: Vehicle) -> bool:
+    """True for a coefficient that port/starboard symmetry makes zero at every point."""
+    mirror = mirror_of(term, part, vehicle)
+    own = (mirror.name, mirror.part) == (term.name, part)
+    return own and mirror.sign < 0 and min(mirror.axis_signs, default=1) > 0
+
+
+def table_points(
+    nodes: Sequence[Node], term: Term, part: str, vehicle: Vehicle
+) -> tuple[list[Point], list[int], list[int]]:
+    """Points at which a coefficient is known, from runs and by symmetry.
+
+    Parameters
+    ----------
+    nodes : The values found.
+    term, part, vehicle : The coefficient.
+
+    Returns
+    -------
+    points : Sorted.
+    indices : Node of each point.
+    signs : Coefficient = sign * node; 0 where symmetry makes it zero.
+    """
+    mirror = mirror_of(term, part, vehicle)
+    points: dict[Point, tuple[int, int]] = {}
+    for i, node in enumerate(nodes):
+        if (node.name, node.part) == (term.name, part):
+            points[node.point] = (i, 1)
+    for i, node in enumerate(nodes):
+        if (node.name, node.part) == (mirror.name, mirror.part):
+            # A mirror undoes itself, so its signs lead back as well.
+            points.setdefault(mirror.point(node.point), (i, mirror.sign))
+    flips = [k for k, s in enumerate(mirror.axis_signs) if s < 0]
+    if flips and (mirror.name, mirror.part) == (term.name, part) and mirror.sign < 0:
+        for point, (i, _) in list(points.items()):
+            points.setdefault(tuple(0.0 if k in flips else x for k, x in enumerate(point)), (i, 0))
+    places = sorted(points)
+    return places, [points[p][0] for p in places], [points[p][1] for p in places]

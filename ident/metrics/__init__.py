@@ -1,0 +1,1 @@
+"""What is measured of a maneuver: ITTC and IMO metrics, seakeeping statistics."""

@@ -1,0 +1,204 @@
+"""Metrics and figures of cases in waves: harmonics, statistics of a seaway, drift of a turn."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ident.metrics import seakeeping, seaway
+from ident.metrics.exceedance import exceedances, extreme
+from ident.metrics.seakeeping import Harmonics, as_published
+from ident.metrics.seaway import Statistics
+from sim.boat.database import version_words
+from sim.flight.case import Case
+from sim.flight.simulate import Simulation
+from sim.waves.linear import mean_direction
+
+if TYPE_CHECKING:
+    from ident.validation.validate import Validation
+
+Array = NDArray[np.float64]
+Metrics = dict[str, float | None]
+# The sail top at the calm surface: broaching.
+_BROACHING = 0.0
+_CHANNELS = ("D0", "theta", "phi")
+# An extreme is asked for over the duration of a sea state [h], and passed with this probability.
+_HOURS, _RISK = 3.0, 0.01
+
+
+@dataclass(frozen=True)
+class InWaves:
+    """What is computed once of a flight in waves, for its metrics and figures; empty of any other.
+
+    Attributes
+    ----------
+    harmonics : Channel -> harmonics, in a regular wave.
+    statistics : Channel -> statistics, in an irregular sea.
+    """
+
+    harmonics: Mapping[str, Harmonics] = field(default_factory=dict)
+    statistics: Mapping[str, Statistics] = field(default_factory=dict)
+
+
+def in_waves(case: Case, simulation: Simulation) -> InWaves:
+    """Harmonics or statistics of a flight, as its case asks for; raises as those."""
+    if case.maneuver == "regular_waves":
+        return InWaves(harmonics=seakeeping.harmonics(simulation))
+    if case.maneuver == "irregular_waves":
+        return InWaves(statistics=seaway.statistics(simulation, _CHANNELS))
+    return InWaves()
+
+
+def regular_waves(found: Mapping[str, Harmonics]) -> Metrics:
+    """First harmonics of depth over wave amplitude and of pitch, with means, of a flight in a regular wave."""
+    own = as_published(found)
+    return {
+        "dz1_over_aw": own["dz1_over_aw"][0],
+        "theta1_deg": own["theta1"][0],
+        "dz1_over_aw_stderr": own["dz1_over_aw"][1],
+        "theta1_stderr_deg": own["theta1"][1],
+        "speed_mean_mps": found["D0"].encounter.speed,
+        "D0_mean_m": found["D0"].mean,
+        "theta_mean_deg": math.degrees(found["theta"].mean),
+        "frequency_of_encounter_radps": found["D0"].encounter.frequency,
+    }
+
+
+def irregular_waves(found: Mapping[str, Statistics], simulation: Simulation) -> Metrics:
+    """Significant values (double amplitude), least depths, and how often the sail top comes out a hour.
+
+    The least depth is that of the whole record, start-up included; beside it the one that Rice's
+    rate lets expect in as much time as the statistics are of and in three hours, and the one that
+    is passed in three hours with 1 %.
+    """
+    depth, pitch, roll = (found[name] for name in _CHANNELS)
+    broaching = exceedances(depth, [_BROACHING])[0]
+    record = extreme(depth, (depth.end - depth.start) / 3600.0)
+    sea_state = extreme(depth, _HOURS, risk=_RISK)
+    return {
+        "statistics_from_s": depth.start,
+        "D0_mean_m": depth.mean,
+        "D0_significant_m": depth.significant,
+        "D0_significant_stderr_m": 4.0 * depth.sigma_stderr,
+        "theta_significant_deg": math.degrees(pitch.significant),
+        "theta_significant_stderr_deg": math.degrees(4.0 * pitch.sigma_stderr),
+        "phi_significant_deg": math.degrees(roll.significant),
+        "D0_period_s": depth.period,
+        "D0_least_m": float(simulation["D0"].min()),
+        "D0_least_rice_m": record["expected"],
+        "D0_least_3h_rice_m": sea_state["expected"],
+        "D0_least_3h_1percent_rice_m": sea_state["at_risk"],
+        "broaching_per_hour": broaching.per_hour,
+        "broaching_per_hour_rice": broaching.predicted,
+    }
+
+
+def turn_drift(simulation: Simulation) -> Metrics:
+    """How a turning circle drifts with the waves: velocity of its centre and its diameter.
+
+    Each whole turn of the heading after the first has a mean position and an extent; the drift
+    is the slope of the mean positions over time, errors are those of the scatter among turns.
+    """
+    heading = np.unwrap(simulation["psi"]) - simulation["psi"][0]
+    turns = np.floor(np.abs(heading) / (2.0 * math.pi)).astype(int)
+    whole = [k for k in range(1, int(turns.max())) if (turns == k).any()]
+    names = ("drift_along_waves_mps", "drift_across_waves_mps", "drift_stderr_mps")
+    sizes = ("diameter_mean_m", "diameter_stderr_m")
+    if len(whole) < 3 or simulation.waves is None or simulation.waves.amplitude.size == 0:
+        return dict.fromkeys((*names, *sizes))
+    waves, centre, time, size = simulation.waves, [], [], []
+    ahead = mean_direction(waves)
+    ahead /= max(float(np.hypot(*ahead)), 1e-12)
+    for k in whole:
+        use = turns == k
+        x, y = simulation["x"][use], simulation["y"][use]
+        centre.append([x.mean(), y.mean()])
+        time.append(simulation["t"][use].mean())
+        size.append(0.5 * (np.ptp(x) + np.ptp(y)))
+    t = np.array(time) - np.mean(time)
+    place = np.array(centre) - np.mean(centre, axis=0)
+    drift = t @ place / (t @ t)
+    left = place - np.outer(t, drift)
+    error = math.sqrt(float((left**2).sum()) / (2.0 * max(len(t) - 2, 1)) / float(t @ t))
+    along, across = float(drift @ ahead), float(drift @ [-ahead[1], ahead[0]])
+    spread = float(np.std(size, ddof=1) / math.sqrt(len(size)))
+    return dict(zip((*names, *sizes), (along, across, error, float(np.mean(size)), spread), strict=True))
+
+
+def sea_figures(done: Validation, folder: Path) -> list[Path]:
+    """Figures of a flown case in an irregular sea: histories, spectra, exceedance of broaching.
+
+    Parameters
+    ----------
+    done : A flown case; of any other there are none.
+    folder : Where to write.
+    """
+    if done.case.maneuver != "irregular_waves" or done.simulation.waves is None:
+        return []
+    from ident.validation.wave_figures import exceedance_figure, seaway_figure, spectrum_figure
+
+    database = done.result["database"]
+    stamp = version_words(database)
+    title, name = f"{done.case.title}, {done.case.vehicle}", f"{done.case.name}_v{database['version']}"
+    found = done.in_waves.statistics
+    met = seaway.encountered(done.simulation.waves, done.simulation, start=found["D0"].start)
+    return [
+        seaway_figure(done.simulation, found, folder / f"{name}_histories.png", title, stamp, _BROACHING),
+        spectrum_figure(found, met, folder / f"{name}_spectra.png", title, stamp),
+        exceedance_figure(found["D0"], folder / f"{name}_broaching.png", title, stamp, "below", _BROACHING),
+    ]
+
+
+def harmonics_over_depth(done: list[Validation], folder: Path) -> list[Path]:
+    """First harmonics over depth of the cases in a regular wave that were flown, beside the published ones.
+
+    Parameters
+    ----------
+    done : Flown cases.
+    folder : Where to write.
+
+    Returns
+    -------
+    A figure for each vehicle and wave; none when no case is in regular waves.
+    """
+    groups: dict[str, list[Validation]] = {}
+    for one in done:
+        if one.in_waves.harmonics and one.case.waves is not None:
+            depth = one.case.initial.depth_m
+            key = f"{one.case.vehicle} {one.case.initial.speed_mps} {one.case.waves.model_dump_json()}"
+            while any(other.case.initial.depth_m == depth for other in groups.get(key, [])):
+                key += " again"
+            groups.setdefault(key, []).append(one)
+    return [_over_depth(group, folder, f"_{i + 1}" if i else "") for i, group in enumerate(groups.values())]
+
+
+def _over_depth(done: list[Validation], folder: Path, suffix: str) -> Path:
+    """The figure of one vehicle in one wave."""
+    import pandas as pd
+
+    from ident.validation.wave_figures import harmonics_figure
+
+    metric = {"dz1_over_aw": "dz1_over_aw", "theta1_deg": "theta1"}
+    rows = [
+        {"source": p.source, "channel": metric[p.metric], "D0_m": d.case.initial.depth_m}
+        | {"value": p.value, "sigma": p.sigma or 0.0}
+        for d in done
+        for p in d.case.published
+        if p.metric in metric
+    ]
+    reference = pd.DataFrame(rows, columns=["source", "channel", "D0_m", "value", "sigma"])
+    flown = {d.case.initial.depth_m: d.in_waves.harmonics for d in done}
+    database, case = done[0].result["database"], done[0].case
+    encounter = next(iter(done[0].in_waves.harmonics.values())).encounter
+    wave = f"waves {2.0 * encounter.amplitude:.3g} m high, {2.0 * math.pi / encounter.number:.4g} m long"
+    # mu is 180 deg in head seas.
+    title = f"{case.vehicle} in regular {wave}, mu = {math.degrees(encounter.angle):.0f} deg"
+    title += f", U = {encounter.speed:.3g} m/s"
+    path = folder / f"harmonics_in_waves{suffix}_v{database['version']}.png"
+    return harmonics_figure(flown, reference, path, title, version_words(database))

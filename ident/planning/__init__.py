@@ -1,0 +1,1 @@
+"""The fewest further runs that give every term a wanted standard error."""

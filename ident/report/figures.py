@@ -1,0 +1,341 @@
+"""Figures of the coefficient report: every tabulated value against its axes.
+
+One figure a group and part. Where a coefficient is tabulated over speed and depth a row
+of panels is one coefficient, a column one speed and a line one depth, as the source plots
+them. Colour is the quality word, in all figures the same; hollow points are mirror images.
+"""
+
+from __future__ import annotations
+
+import base64
+import io
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import pandas as pd
+
+from sim.boat import catalogue
+from sim.boat.catalogue import Term
+from sim.boat.parts import vehicle_terms
+from sim.boat.vehicle import Vehicle
+from sim.files.frames import PROGRAM
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+# From trustworthy (blue, green) to doubtful (red, black); assigned by rising factor.
+_PALETTE = (
+    *("#1f4e9c", "#2a9d8f", "#7fb2e5", "#6a994e", "#c9a227", "#8c6d1f"),
+    *("#f28e2b", "#a0522d", "#e377c2", "#d1263b", "#8e44ad", "#2b2b2b"),
+)
+_MARKERS = "osD^vP*X"
+_SYMMETRY = "#777777"
+_COLUMNS = 3
+_LEGEND_COLUMNS = 6
+_STYLE: Any = {
+    "font.size": 8.5,
+    "axes.titlesize": 8.5,
+    "axes.grid": True,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "grid.color": "#e3e3e3",
+    "grid.linewidth": 0.6,
+    "axes.axisbelow": True,
+    "svg.hashsalt": "ident",
+}
+
+
+@dataclass(frozen=True)
+class Panel:
+    """One set of axes: a coefficient (or several constants) with its rows."""
+
+    title: str
+    ylabel: str
+    x: str | None
+    line: str | None
+    column: float | None
+    rows: pd.DataFrame
+    labels: str = ""
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A finished figure: anchor, title, caption and the image as a ``data:`` address."""
+
+    anchor: str
+    title: str
+    caption: str
+    image: str
+
+
+def quality_colours(words: Iterable[str]) -> dict[str, str]:
+    """Colour of each quality word; ``words`` in the order of rising factor."""
+    return {word: _PALETTE[i % len(_PALETTE)] for i, word in enumerate(words)}
+
+
+def equations(term: Term) -> str:
+    """Equation numbers of a term, as printed in titles."""
+    return "Eq. " + ", ".join(term.equation.split())
+
+
+def _column(axis: str) -> str:
+    return catalogue.axes()[axis].column
+
+
+def _varying(term: Term, rows: pd.DataFrame) -> list[str]:
+    return [a for a in term.axes if rows[_column(a)].nunique() > 1]
+
+
+def _panels(term: Term, rows: pd.DataFrame) -> list[tuple[str, Panel]]:
+    """Panels of one tabulated coefficient, with the abscissa that decides the figure."""
+    varying = _varying(term, rows)
+    free = [a for a in varying if a not in ("U", "D0")]
+    found = []
+    for x in free or (["D0"] if "D0" in varying else [term.axes[0]]):
+        # Along one axis the others stand at zero: the runs of a pure motion.
+        others = [_column(a) for a in free if a != x]
+        along = rows[(rows[others] == 0.0).all(axis=1)] if others else rows
+        line = next((a for a in ("D0", "U") if a in varying and a != x), None)
+        title = f"{term.name}   {equations(term)}"
+        if x in free and "U" in varying:
+            line = "D0" if "D0" in varying else None
+            for speed, part in along.groupby(_column("U")):
+                head = f"{title}   U = {float(str(speed)):.4g} m/s"
+                found.append((x, Panel(head, term.name, x, line, float(str(speed)), part)))
+        else:
+            found.append(("", Panel(title, term.name, x, line, None, along)))
+    return found
+
+
+def _constants(terms: Sequence[Term], rows: pd.DataFrame) -> list[tuple[Term, str, Panel]]:
+    """Panels of coefficients without axes: bars over the parts, or over the symbols."""
+    found = []
+    by_key: dict[tuple[str, str, str], list[Term]] = {}
+    for term in terms:
+        own = term.name if term.part == "section" or not term.output else ""
+        by_key.setdefault((term.group, term.output, own), []).append(term)
+    for (_, output, own), members in by_key.items():
+        part = rows[rows["coefficient"].isin([t.name for t in members])]
+        if own:
+            head, labels = f"{own}   {equations(members[0])}", "part" if members[0].part == "section" else "coefficient"
+        else:
+            numbers = dict.fromkeys(n for t in members for n in t.equation.split())
+            head, labels = f"{output}   Eq. {', '.join(numbers)}", "coefficient"
+        found.append((members[0], "", Panel(head, own or output, None, None, None, part, labels)))
+    return found
+
+
+def _group(terms: Sequence[Term], rows: pd.DataFrame) -> dict[tuple[str, str, str], list[Panel]]:
+    """Panels by figure: (group, part, abscissa)."""
+    figures: dict[tuple[str, str, str], list[Panel]] = {}
+    tabulated = [t for t in terms if t.axes]
+    for term in tabulated:
+        own = rows[rows["coefficient"] == term.name]
+        for part, group in own.groupby("part", sort=False):
+            for x, panel in _panels(term, group):
+                figures.setdefault((term.group, str(part), x), []).append(panel)
+    present = set(rows["coefficient"])
+    for term, x, panel in _constants([t for t in terms if not t.axes and t.name in present], rows):
+        part_name = "sections" if term.part == "section" else term.part
+        figures.setdefault((term.group, part_name, x), []).append(panel)
+    return figures
+
+
+def _line_values(panels: list[Panel]) -> dict[str, list[float]]:
+    values: dict[str, set[float]] = {}
+    for panel in panels:
+        if panel.line:
+            values.setdefault(panel.line, set()).update(panel.rows[_column(panel.line)])
+    return {axis: sorted(found) for axis, found in values.items()}
+
+
+def _shade(i: int, count: int) -> str:
+    """Grey of a line: the deepest (or fastest) is the darkest."""
+    return str(round(0.75 - 0.6 * (i + 1) / max(count, 1), 3))
+
+
+def _points(axes: Axes, x: Any, rows: pd.DataFrame, marker: str, colours: dict[str, str]) -> None:
+    """Points with error bars, filled when measured and hollow when mirrored."""
+    zero = rows["origin"] == "symmetry"
+    if zero.any():
+        axes.plot(x[zero], rows["value"][zero], "x", color=_SYMMETRY, markersize=4.5, zorder=4)
+    rows, x = rows[~zero], x[~zero]
+    if rows.empty:
+        return
+    edges: Any = [colours.get(q, _SYMMETRY) for q in rows["quality"]]
+    faces = [e if o == "measured" else "white" for e, o in zip(edges, rows["origin"], strict=True)]
+    axes.errorbar(x, rows["value"], yerr=rows["stderr"], fmt="none", ecolor=edges, elinewidth=0.9, zorder=3)
+    axes.scatter(x, rows["value"], s=15, marker=marker, facecolors=faces, edgecolors=edges, linewidths=0.9, zorder=3)
+
+
+def _draw_curve(axes: Axes, panel: Panel, lines: dict[str, list[float]], colours: dict[str, str]) -> None:
+    assert panel.x is not None
+    axis = catalogue.axes()[panel.x]
+    known = lines.get(panel.line or "", [])
+    groups = panel.rows.groupby(_column(panel.line)) if panel.line else [(None, panel.rows)]
+    for key, group in groups:
+        i = known.index(float(str(key))) if panel.line else 0
+        group = group.sort_values(axis.column)
+        axes.plot(group[axis.column], group["value"], "-", color=_shade(i, len(known)), linewidth=1.0, zorder=2)
+        _points(axes, group[axis.column], group, _MARKERS[i % len(_MARKERS)], colours)
+    unit = "" if axis.unit == "1" else f" [{axis.unit}]"
+    axes.set_xlabel(f"{axis.name}{unit}")
+    axes.set_ylabel(f"{panel.ylabel} [-]")
+    low, high = axes.get_ylim()
+    if low < 0.0 < high:
+        axes.axhline(0.0, color="#aaaaaa", linewidth=0.7, zorder=1)
+    axes.ticklabel_format(axis="both", style="sci", scilimits=(-2, 3), useMathText=True)
+    axes.locator_params(axis="x", nbins=7)
+
+
+def _draw_bars(axes: Axes, panel: Panel, colours: dict[str, str]) -> None:
+    rows = panel.rows.reset_index(drop=True)
+    place = list(range(len(rows)))
+    axes.barh(
+        place,
+        rows["value"],
+        xerr=rows["stderr"],
+        color=[colours.get(q, _SYMMETRY) for q in rows["quality"]],
+        error_kw={"elinewidth": 0.9, "capsize": 2},
+        height=0.65 if len(rows) > 1 else 0.2,
+    )
+    axes.set_yticks(place, [str(p) for p in rows[panel.labels]])
+    axes.set_ylim(len(rows) - 0.4 if len(rows) > 1 else 0.6, -0.6)
+    axes.axvline(0.0, color="#aaaaaa", linewidth=0.7)
+    axes.set_xlabel(f"{panel.ylabel} [-]" if panel.labels == "part" else "value [-]")
+    axes.ticklabel_format(axis="x", style="sci", scilimits=(-2, 3), useMathText=True)
+    axes.locator_params(axis="x", nbins=5)
+
+
+def _legend(panels: list[Panel], lines: dict[str, list[float]], colours: dict[str, str]) -> list[Any]:
+    """Handles of the lines, quality words and origins that stand in a figure."""
+    from matplotlib.lines import Line2D
+
+    handles = []
+    for axis, values in lines.items():
+        unit = catalogue.axes()[axis].unit
+        for i, value in enumerate(values):
+            marker, shade = _MARKERS[i % len(_MARKERS)], _shade(i, len(values))
+            label = f"{axis} = {value:.4g} {unit}"
+            handles.append(Line2D([], [], color=shade, marker=marker, markersize=4, linewidth=1, label=label))
+    rows = pd.concat([p.rows for p in panels])
+    for word, colour in colours.items():
+        if (rows["quality"] == word).any():
+            handles.append(Line2D([], [], color=colour, marker="o", linestyle="", markersize=5, label=word))
+    if (rows["origin"] == "mirror").any():
+        style = {"color": "#444444", "markerfacecolor": "white", "linestyle": ""}
+        handles.append(Line2D([], [], marker="o", markersize=5, label="port/starboard mirror", **style))  # type: ignore[arg-type]
+    if (rows["origin"] == "symmetry").any():
+        handles.append(Line2D([], [], marker="x", color=_SYMMETRY, linestyle="", label="zero by symmetry"))
+    return handles
+
+
+def _grid(panels: list[Panel]) -> tuple[int, int, list[tuple[int, int]]]:
+    """Rows, columns and the place of each panel."""
+    speeds = sorted({p.column for p in panels if p.column is not None})
+    if not speeds:
+        columns = 2 if len(panels) == 4 else min(_COLUMNS, len(panels))
+        return -(-len(panels) // columns), columns, [divmod(i, columns) for i in range(len(panels))]
+    names = list(dict.fromkeys(p.ylabel for p in panels))
+    return len(names), len(speeds), [(names.index(p.ylabel), speeds.index(p.column)) for p in panels]  # type: ignore[arg-type]
+
+
+def _share_labels(grid: Any, panels: list[Panel], places: list[tuple[int, int]]) -> None:
+    """Label the abscissa once a column of speeds, the sections once a row."""
+    lowest: dict[int, int] = {}
+    for row, column in places:
+        lowest[column] = max(row, lowest.get(column, 0))
+    for panel, (row, column) in zip(panels, places, strict=True):
+        axes = grid[row, column]
+        if panel.column is not None and row < lowest[column]:
+            axes.set_xlabel("")
+            axes.tick_params(labelbottom=False)
+        if panel.labels == "part" and column:
+            axes.tick_params(labelleft=False)
+
+
+def _frame(rows: int, columns: int, panels: list[Panel], entries: int) -> tuple[Figure, Any]:
+    """A figure with room for titles, labels and legend; lengths in inches."""
+    from matplotlib.figure import Figure
+
+    # Fixed margins: an automatic layout costs more time than all the drawing.
+    bars = max((len(p.rows) for p in panels if p.x is None), default=0)
+    left, between = (1.4, 1.3) if bars > 1 else (0.75, 0.75)
+    if all(p.labels == "part" for p in panels):
+        between = 0.3
+    gap = 0.45 if panels[0].column is not None else 0.8
+    tall, top, bottom = max(1.75, 0.24 * bars), 0.75, 0.65 + 0.22 * -(-entries // _LEGEND_COLUMNS)
+    width = left + 0.15 + 2.9 * columns + between * (columns - 1)
+    height = top + bottom + tall * rows + gap * (rows - 1)
+    figure = Figure(figsize=(width, height))
+    figure.subplots_adjust(
+        left=left / width,
+        right=1.0 - 0.15 / width,
+        top=1.0 - top / height,
+        bottom=bottom / height,
+        wspace=between / 2.9,
+        hspace=gap / tall,
+    )
+    return figure, figure.subplots(rows, columns, squeeze=False)
+
+
+def _draw(panels: list[Panel], title: str, stamp: str, colours: dict[str, str]) -> str:
+    """One figure as an SVG ``data:`` address."""
+    import matplotlib as mpl
+
+    rows, columns, places = _grid(panels)
+    lines = _line_values(panels)
+    with mpl.rc_context(_STYLE):
+        handles = _legend(panels, lines, colours)
+        figure, grid = _frame(rows, columns, panels, len(handles))
+        for axes in grid.flat:
+            axes.set_visible(False)
+        for panel, place in zip(panels, places, strict=True):
+            axes = grid[place]
+            axes.set_visible(True)
+            # The power of ten stands at the left, so the title goes to the right.
+            axes.set_title(panel.title, loc="right")
+            if panel.x is None:
+                _draw_bars(axes, panel, colours)
+            else:
+                _draw_curve(axes, panel, lines, colours)
+        _share_labels(grid, panels, places)
+        height = figure.get_figheight()
+        figure.legend(handles=handles, loc="lower center", ncols=min(len(handles), _LEGEND_COLUMNS), frameon=False)
+        figure.suptitle(f"{title}\n{stamp}", fontsize=9.5, y=1.0 - 0.1 / height)
+        stream = io.BytesIO()
+        figure.savefig(stream, format="svg", metadata={"Date": None})
+    return "data:image/svg+xml;base64," + base64.b64encode(stream.getvalue()).decode()
+
+
+def draw_figures(vehicle: Vehicle, rows: pd.DataFrame, colours: dict[str, str], version: int) -> list[Picture]:
+    """Every coefficient of one vehicle, drawn.
+
+    Parameters
+    ----------
+    vehicle : Decides the terms and the order of its parts.
+    rows : Its database rows.
+    colours : From ``quality_colours``.
+    version : Database version, printed on each figure with vehicle and frame.
+
+    Returns
+    -------
+    One picture a group, part and abscissa.
+    """
+    order = {name: i for i, name in enumerate(vehicle.part_names())}
+    rows = rows.sort_values("part", key=lambda part: part.map(order), kind="stable")
+    found = []
+    stamp = f"{vehicle.name}, database version {version}; program frame: {PROGRAM}"
+    for (group, part, x), panels in _group(vehicle_terms(vehicle), rows).items():
+        title = group.capitalize() if part in ("hull", "propeller", "sections") else f"{group.capitalize()}: {part}"
+        if x and x != "delta":
+            title += f" against {x}"
+        names: list[str] = []
+        for panel in panels:
+            names += list(panel.rows["coefficient"])
+        anchor = "fig-" + "-".join(w for w in (group, part, x) if w).replace(" ", "-").lower()
+        caption = ", ".join(dict.fromkeys(names))
+        found.append(Picture(anchor, title, caption, _draw(panels, title, stamp, colours)))
+    return found

@@ -1,0 +1,273 @@
+"""The report of one database version: a single self-contained HTML page."""
+
+from __future__ import annotations
+
+import csv
+import json
+import re
+from datetime import UTC, datetime
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from ident.analysis.derivatives import checks, derivatives
+from ident.checks.findings import SEVERITIES, spans
+from ident.database.provenance import steps
+from ident.fitting.notes import group_unused, group_warnings
+from ident.output import whole
+from ident.report.figures import draw_figures, equations, quality_colours
+from sim.boat import catalogue
+from sim.boat.catalogue import RULES, Term
+from sim.boat.coefficients import Coefficients
+from sim.boat.database import Version, axis_columns, own_version, read_rows
+from sim.boat.parts import parts_of, vehicle_terms
+from sim.boat.vehicle import Vehicle, load_vehicle
+from sim.files.frames import PROGRAM
+from sim.kernel.assemble import Environment
+
+# Prime derivatives do not depend on density and gravity, so both may be anything.
+_UNIT = Environment(density=1.0, gravity=0.0)
+
+
+def _stored(metadata: dict[str, str], key: str, default: Any) -> Any:
+    """A JSON value of the commit, or ``default`` when it is missing or damaged."""
+    try:
+        found = json.loads(metadata.get(key, ""))
+    except ValueError:
+        return default
+    return found if isinstance(found, type(default)) else default
+
+
+def _time(stamp: str) -> str:
+    return datetime.fromtimestamp(int(stamp) / 1000, UTC).strftime("%Y-%m-%d %H:%M UTC") if stamp.isdigit() else stamp
+
+
+def _provenance(db: str, number: int, commit: Version, vehicle: Vehicle) -> list[tuple[str, str]]:
+    known = commit.metadata
+    options = _stored(known, "options", {})
+    return [
+        ("Database", db),
+        ("Version", str(number)),
+        ("Vehicle", f"{vehicle.name}: {vehicle.title}"),
+        ("Term set", f"{vehicle.term_set}, added mass from {vehicle.added_mass}"),
+        ("Committed", f"as version {commit.number}, {_time(commit.timestamp)}".rstrip(", ")),
+        ("Digest of the vehicle's rows (SHA-256)", commit.digest),
+        ("Parent version", known.get("parent", "") or "none: the first commit"),
+        ("Program", known.get("program", "")),
+        ("Message", known.get("message", "")),
+        ("Campaign", known.get("campaign", "")),
+        ("Facility", known.get("facility", "")),
+        ("Frame of the campaign", known.get("frame", "")),
+        ("Frame of the database", f"{PROGRAM} (SNAME)"),
+        ("Provenance", " ".join(known.get("provenance", "").split())),
+        ("Options of the fit", ", ".join(f"{k} = {v}" for k, v in options.items()) or "none"),
+    ]
+
+
+def _figure(x: float) -> str:
+    return f"{x:.5g}".replace("-", "\N{MINUS SIGN}")
+
+
+def _ranges(term: Term, rows: pd.DataFrame) -> list[str]:
+    """What the runs cover along each axis, in database units."""
+    found = []
+    for name in term.axes:
+        axis = catalogue.axes()[name]
+        values = sorted(rows[axis.column].unique())
+        unit = "" if axis.unit == "1" else f" {axis.unit}"
+        if len(values) == 1:
+            text = f"{_figure(values[0])}{unit} only"
+        elif name == "D0":
+            text = ", ".join(_figure(v) for v in values) + unit
+        else:
+            text = f"{_figure(values[0])} to {_figure(values[-1])}{unit} ({len(values)})"
+        found.append(f"{name}: {text}")
+    return found
+
+
+def _notes(term: Term, rows: pd.DataFrame) -> list[str]:
+    """What a reader should know before trusting the coefficient off its points."""
+    columns = {a: c for c, a in axis_columns().items()}
+    single = [a for a in term.axes if rows[columns[a]].nunique() == 1]
+    notes = [f"one {a} only: used at every {a}" for a in single]
+    if {"alpha", "beta"} <= set(term.axes) - set(single):
+        both = (rows[columns["alpha"]] != 0.0) & (rows[columns["beta"]] != 0.0)
+        if not both.any():
+            notes.append("no run has alpha and beta together: superposed")
+    if (rows["origin"] == "published").any():
+        notes.append("given by the source as a coefficient, not by runs")
+    elif not (rows["origin"] == "measured").any():
+        notes.append("all from the partner plane's runs by the mirror")
+    return notes
+
+
+def _coverage(vehicle: Vehicle, rows: pd.DataFrame, factors: dict[str, float]) -> list[dict[str, Any]]:
+    """One row a term of the vehicle's set, with data or absent."""
+    found = []
+    for term in vehicle_terms(vehicle):
+        own = rows[rows["coefficient"] == term.name]
+        parts = parts_of(term, vehicle)
+        row: dict[str, Any] = {
+            "symbol": term.name,
+            "group": term.group,
+            "part": parts[0] if len(parts) == 1 else f"{own['part'].nunique()} of {len(parts)} sections",
+            "equation": equations(term),
+            "multiplier": term.multiplier or "1",
+            "tests": " ".join(term.tests),
+            "absent": own.empty,
+        }
+        if not own.empty:
+            origin = own["origin"].value_counts()
+            words = sorted({q for q in own["quality"] if q}, key=lambda q: factors.get(q, 0.0))
+            row |= {
+                "measured": int(origin.get("measured", 0) + origin.get("published", 0)),
+                "mirror": int(origin.get("mirror", 0)),
+                "symmetry": int(origin.get("symmetry", 0)),
+                "ranges": _ranges(term, own),
+                "quality": words[-1] if words else "",
+                "worst_points": int((own["quality"] == words[-1]).sum()) if words else 0,
+                "worst": float(own["worst_residual"].max()),
+                "rules": [f"{a}: {r}" for a, r in term.extrapolation.items()],
+                "notes": _notes(term, own),
+            }
+        found.append(row)
+    return found
+
+
+def _signs(coefficients: Coefficients, rows: pd.DataFrame) -> dict[str, Any]:
+    """Derivatives at the largest tabulated speed and depth, where most data are."""
+    columns = {a: c for c, a in axis_columns().items()}
+    speed, depth = (float(rows[columns[a]].max()) for a in ("U", "D0"))
+    if coefficients.vehicle.term_set != "reduced":
+        # Constant coefficients have the same derivatives at every speed and depth.
+        speed, depth = 1.0, 0.0
+    if speed > 0.0:
+        found = derivatives(coefficients, _UNIT, speed, 0.0 if depth != depth else depth)
+    else:
+        found = []
+    sources = list(dict.fromkeys(c.source for c in checks() if c.suboff is not None))
+    return {"speed": speed, "depth": depth, "rows": found, "passed": sum(d.ok for d in found), "sources": sources}
+
+
+def _vocabulary(metadata: dict[str, str], rows: pd.DataFrame) -> list[dict[str, Any]]:
+    """Quality words by rising factor, with the number of points behind each."""
+    known = _stored(metadata, "quality", {})
+    counts = rows["quality"].value_counts()
+    words = sorted({*known, *(q for q in counts.index if q)}, key=lambda w: known.get(w, {}).get("factor", 1.0))
+    words.sort(key=lambda w: (known.get(w, {}).get("factor", 1.0), list(known).index(w) if w in known else 0))
+    return [
+        {
+            "word": w,
+            "factor": known.get(w, {}).get("factor"),
+            "meaning": known.get(w, {}).get("meaning", "not in the commit's vocabulary"),
+            "points": int(counts.get(w, 0)),
+        }
+        for w in words
+    ]
+
+
+def _calibration(commit: Version, vehicle: Vehicle, number: int) -> dict[str, Any] | None:
+    """What the version was calibrated with, with verdicts and a figure; None for captive versions."""
+    from ident.calibration.figure import prior_and_posterior
+    from ident.calibration.version import verdict
+
+    found = _stored(commit.metadata, "calibration", {})
+    if not found:
+        return None
+    stamp = f"{vehicle.name}, database version {number}; program frame: {PROGRAM}"
+    groups = [g | {"verdict": verdict(g)} for g in found["groups"]]
+    return found | {"groups": groups, "figure": prior_and_posterior(found, stamp)}
+
+
+def _errata() -> list[dict[str, str]]:
+    with (files("ident") / "data" / "errata.csv").open(encoding="utf-8") as stream:
+        return list(csv.DictReader(stream))
+
+
+def _content(db: str, number: int, vehicle: Vehicle, rows: pd.DataFrame, commit: Version) -> dict[str, Any]:
+    """Everything the template shows."""
+    vocabulary = _vocabulary(commit.metadata, rows)
+    colours = quality_colours(q["word"] for q in vocabulary)
+    coverage = _coverage(vehicle, rows, {q["word"]: q["factor"] or 1.0 for q in vocabulary})
+    columns = {a: c for c, a in axis_columns().items()}
+    combined = (rows[columns["alpha"]].fillna(0.0) != 0.0) & (rows[columns["beta"]].fillna(0.0) != 0.0)
+    return {
+        "vehicle": vehicle,
+        "version": number,
+        "frame": str(PROGRAM),
+        "provenance": [(k, v) for k, v in _provenance(db, number, commit, vehicle) if v],
+        "steps": steps(_stored(commit.metadata, "conversions", {})),
+        "inputs": _stored(commit.metadata, "inputs", {}),
+        "coverage": {g: [c for c in coverage if c["group"] == g] for g in dict.fromkeys(c["group"] for c in coverage)},
+        "present": [c for c in coverage if not c["absent"]],
+        "absent": [c for c in coverage if c["absent"]],
+        "combined": int(combined.sum()),
+        "rules": RULES,
+        "points": len(rows),
+        "pictures": draw_figures(vehicle, rows, colours, number),
+        "signs": _signs(Coefficients(vehicle, rows), rows),
+        "warnings": group_warnings(_stored(commit.metadata, "warnings", [])),
+        "unused": group_unused(_stored(commit.metadata, "unused", [])),
+        "checks": _stored(commit.metadata, "checks", []) if "checks" in commit.metadata else None,
+        "calibration": _calibration(commit, vehicle, number),
+        "vocabulary": vocabulary,
+        "colours": colours,
+        "errata": _errata(),
+    }
+
+
+def _severities(findings: list[dict[str, Any]] | None) -> dict[str, int] | None:
+    """Number of quality findings by severity; None where the commit holds none of them."""
+    if findings is None:
+        return None
+    return {s: sum(f.get("severity") == s for f in findings) for s in reversed(SEVERITIES)}
+
+
+def write_report(db: str, version: int | None, out: Path, vehicle: str = "bb2") -> dict[str, Any]:
+    """Write the report of one vehicle at one database version.
+
+    Parameters
+    ----------
+    db : Folder or object-store URL of the database.
+    version : Version number, latest when None.
+    out : Folder for the page; created when absent.
+    vehicle : Bundled name or path to a vehicle file.
+
+    Returns
+    -------
+    What was written, for a program to read: ``file`` (``<vehicle>_v<version>.html``: images,
+    style and all in the one file), vehicle, version and digest, and how much it shows.
+
+    Raises
+    ------
+    InputError
+        When database, version or vehicle do not exist, or the page cannot be written.
+    """
+    from jinja2 import Environment as Templates
+    from jinja2 import StrictUndefined
+
+    boat = load_vehicle(vehicle)
+    rows, number = read_rows(db, version, boat.name)
+    templates = Templates(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    templates.filters["spans"] = spans
+    source = (files("ident") / "report" / "report.html.j2").read_text("utf-8")
+    commit = own_version(db, boat.name, number)
+    content = _content(db, number, boat, rows, commit)
+    page = templates.from_string(source).render(content)
+    path = Path(out) / f"{re.sub(r'[^A-Za-z0-9._-]', '_', boat.name)}_v{number}.html"
+    with whole(path) as part:
+        part.write_text(page, encoding="utf-8")
+    return {
+        "file": str(path),
+        "vehicle": boat.name,
+        "database": {"path": db, "version": number, "digest": commit.digest},
+        "rows": len(rows),
+        "coefficients": len(content["present"]),
+        "absent": [row["symbol"] for row in content["absent"]],
+        "signs": {"expected": content["signs"]["passed"], "of": len(content["signs"]["rows"])},
+        "findings": _severities(content["checks"]),
+        "warnings": len(_stored(commit.metadata, "warnings", [])),
+        "unused": len(_stored(commit.metadata, "unused", [])),
+    }

@@ -1,0 +1,1 @@
+"""Time histories reduced: clocks, block means, standard errors, regression."""

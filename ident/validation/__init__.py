@@ -1,0 +1,1 @@
+"""Cases flown from a version and held against references."""

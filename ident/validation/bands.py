@@ -1,0 +1,348 @@
+"""Error bands: coefficient sets drawn from the database's errors, flown as one batch."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from ident.validation.cluster import over_dask
+from sim.boat.coefficients import Coefficients
+from sim.boat.database import correlation_pairs
+from sim.boat.vehicle import Vehicle
+from sim.files.errors import InputError
+from sim.flight.case import Case, Series, in_radians
+from sim.flight.simulate import DERIVED, columns_of, environment_of, equipped, fly, samples_of, uses_tanks, water_of
+from sim.flight.trim import NoEquilibrium
+from sim.kernel.assemble import Assembly
+from sim.waves.in_waves import Water
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+Array = NDArray[np.float64]
+# Samples handed out at once: enough that handing out costs nothing, few enough for a progress bar.
+CHUNK = 8
+# Relative variance below which a direction of correlated values is rounding.
+_LEAST_VARIANCE = 1e-9
+# Standard deviations of chance that a variance share must exceed.
+_CHANCE = 3.0
+LEVELS = {"50": (25.0, 75.0), "95": (2.5, 97.5)}
+
+
+@dataclass(frozen=True)
+class Bands:
+    """Flown samples of one case.
+
+    Attributes
+    ----------
+    time : (rows,) record times [s].
+    channels : Channel -> (samples, rows), NaN after a sample ended.
+    own : The same of the flights from the start of a source's record, by source.
+    draws : (samples, estimates) what was drawn, in standard errors.
+    correlation : (estimates, estimates) they were drawn with.
+    estimates : Coefficient of each estimate.
+    failed : Samples without a self-propulsion state.
+    seed : Of the random generator.
+    """
+
+    time: Array
+    channels: dict[str, Array]
+    own: dict[str, dict[str, Array]]
+    draws: Array
+    correlation: Array
+    estimates: list[str]
+    failed: int
+    seed: int
+
+    def band(self, channel: str, level: str, source: str = "") -> tuple[Array, Array]:
+        """Lower and upper edge of the 50 or 95 % band of a channel, as a source's record starts."""
+        low, high = np.nanpercentile(self.own.get(source, self.channels)[channel], LEVELS[level], axis=0)
+        return np.asarray(low), np.asarray(high)
+
+
+def covariance(rows: pd.DataFrame) -> tuple[pd.DataFrame, Array]:
+    """One row an estimate, and the correlation matrix of the estimates.
+
+    Parameters
+    ----------
+    rows : Database rows of one vehicle.
+
+    Returns
+    -------
+    estimates : First row of each estimate, in the order of the matrix.
+    correlation : (n, n), unit diagonal.
+    """
+    known = rows[rows["estimate"] >= 0].drop_duplicates("estimate").reset_index(drop=True)
+    place = {int(e): i for i, e in enumerate(known["estimate"])}
+    matrix = np.eye(len(known))
+    for i, text in enumerate(known["correlation"]):
+        for other, coefficient in correlation_pairs(text).items():
+            matrix[i, place[other]] = coefficient
+    return known, 0.5 * (matrix + matrix.T)
+
+
+def draw(correlation: Array, samples: int, seed: int) -> Array:
+    """Correlated standard normal draws.
+
+    Returns
+    -------
+    (samples, n) in standard errors; sample i does not depend on how many are drawn.
+    """
+    values, vectors = np.linalg.eigh(correlation)
+    root = vectors * np.sqrt(np.clip(values, 0.0, None))
+    children = np.random.SeedSequence(seed).spawn(samples)
+    # One product a sample: a single large one would round by the number of samples.
+    return np.stack([root @ np.random.default_rng(child).standard_normal(len(values)) for child in children])
+
+
+def _row_steps(rows: pd.DataFrame, estimates: pd.DataFrame) -> tuple[NDArray[np.int64], Array]:
+    """For each row: its estimate's place (-1 for none) and signed standard error."""
+    place = pd.Series(range(len(estimates)), index=estimates["estimate"])
+    index = np.asarray(rows["estimate"].map(place).fillna(-1), dtype=np.int64)
+    value = estimates["value"].to_numpy()
+    turned = np.sign(rows["value"].to_numpy() * np.where(index >= 0, value[index], 1.0)) < 0.0
+    return index, np.asarray(np.where(turned, -1.0, 1.0) * rows["stderr"].to_numpy(), dtype=np.float64)
+
+
+@dataclass(frozen=True)
+class Batch:
+    """A case to be flown with many sets of row values; goes to other processes as it is.
+
+    Attributes
+    ----------
+    flights : The case, under "", and the case from the start of a source's record, by source.
+    vehicle : Of the case.
+    assembly : Row values to the model.
+    channels : Names of what a flight gives.
+    water : Waves and surface, with the sections' added mass at its database values.
+    """
+
+    flights: dict[str, Case]
+    vehicle: Vehicle
+    assembly: Assembly
+    channels: tuple[str, ...]
+    water: Water | None
+
+    def fly(self, values: Array) -> list[dict[str, Array] | None]:
+        """Fly one sample after the other.
+
+        Parameters
+        ----------
+        values : (k, rows) row values.
+
+        Returns
+        -------
+        For each sample, (channels, records) by source; None without a self-propulsion state.
+        """
+        found: list[dict[str, Array] | None] = []
+        for sample in values:
+            model = self.assembly.model(sample)
+            try:
+                flown = {
+                    s: fly(c, self.vehicle, equipped(c, self.vehicle, model), self.water)
+                    for s, c in self.flights.items()
+                }
+            except NoEquilibrium:
+                found.append(None)
+                continue
+            found.append({s: np.stack([one[c] for c in self.channels]) for s, one in flown.items()})
+        return found
+
+
+def batch_of(case: Case, vehicle: Vehicle, rows: pd.DataFrame) -> Batch:
+    """The batch of a case; raises ``InputError`` when it uses tanks that the vehicle lacks."""
+    started = {s: case.started_as(s) for s in (case.reference.compare if case.reference else [])}
+    coefficients = Coefficients(vehicle, rows)
+    assembly = Assembly(coefficients, environment_of(case))
+    equipped(case, vehicle, assembly.model(rows["value"].to_numpy()))
+    return Batch(
+        flights={"": case} | {s: c for s, c in started.items() if c is not None},
+        vehicle=vehicle,
+        assembly=assembly,
+        channels=(*columns_of(vehicle, uses_tanks(case)), *DERIVED),
+        water=water_of(case, coefficients),
+    )
+
+
+def _over_threads(
+    batch: Batch, chunks: Sequence[Array], workers: int | None
+) -> Iterator[tuple[int, list[dict[str, Array] | None]]]:
+    """Place of a chunk and its flights, as they are done."""
+    with ThreadPoolExecutor(workers or os.cpu_count()) as pool:
+        place = {pool.submit(batch.fly, chunk): i for i, chunk in enumerate(chunks)}
+        for future in as_completed(list(place)):
+            # Popped, so that its flights are not kept.
+            yield place.pop(future), future.result()
+
+
+def fly_samples(
+    case: Case,
+    vehicle: Vehicle,
+    rows: pd.DataFrame,
+    samples: int,
+    seed: int = 0,
+    workers: int | None = None,
+    each: Callable[[int], None] = lambda done: None,
+    dask: str | None = None,
+    chunk: int = CHUNK,
+) -> Bands:
+    """Fly a case with coefficient sets drawn from the errors of the database.
+
+    Sample i depends on the seed and on i alone, wherever it is flown.
+
+    Parameters
+    ----------
+    case, vehicle, rows : What is flown, from which version.
+    samples, seed : Number of coefficient sets and seed of the generator.
+    workers : Threads; all cores when None.
+    each : Called with the number of samples flown since the last call.
+    dask : Address of a Dask scheduler that flies them instead.
+    chunk : Samples handed out at once.
+
+    Returns
+    -------
+    Bands over the simulated states.
+
+    Raises
+    ------
+    InputError
+        When no sample has a self-propulsion state, or as ``ident.validation.cluster.over_dask``.
+    """
+    estimates, correlation = covariance(rows)
+    draws = draw(correlation, samples, seed)
+    index, step = _row_steps(rows, estimates)
+    value = rows["value"].to_numpy() + np.where(index >= 0, draws[:, index] * step, 0.0)
+    chunks = [value[i : i + chunk] for i in range(0, samples, chunk)]
+    batch = batch_of(case, vehicle, rows)
+    steps, every = samples_of(case)
+    shape = (len(batch.channels), samples, steps // every + 1)
+    stacks = {source: np.full(shape, np.nan) for source in batch.flights}
+    flown = np.zeros(samples, dtype=bool)
+    for place, found in over_dask(dask, batch, chunks) if dask else _over_threads(batch, chunks, workers):
+        for i, one in enumerate(found, start=place * chunk):
+            flown[i] = one is not None
+            for source, record in (one or {}).items():
+                stacks[source][:, i, : record.shape[1]] = record
+        each(len(found))
+    if not flown.any():
+        raise InputError(f"case {case.name}", "no sample has a self-propulsion state", "smaller errors or another case")
+    kept = {source: stack if flown.all() else stack[:, flown] for source, stack in stacks.items()}
+    time, channels = _up_to_the_end(case, batch, kept)
+    return Bands(
+        time=time,
+        channels=channels.pop(""),
+        own=channels,
+        draws=draws[flown],
+        correlation=correlation,
+        estimates=list(estimates["coefficient"]),
+        failed=int(samples - flown.sum()),
+        seed=seed,
+    )
+
+
+def _up_to_the_end(case: Case, batch: Batch, stacks: dict[str, Array]) -> tuple[Array, dict[str, dict[str, Array]]]:
+    """Times and, by source, channels up to the end of the longest flight."""
+    ends = np.max([np.isfinite(stack[0]).any(axis=0).sum() for stack in stacks.values()])
+    channels = {s: dict(zip(batch.channels, stack[:, :, :ends], strict=True)) for s, stack in stacks.items()}
+    time = np.arange(ends) * samples_of(case)[1] * case.run.step_s
+    for stack in channels.values():
+        del stack["t"]
+    return time, channels
+
+
+def inside(bands: Bands, case: Case, reference: Series) -> dict[str, Any]:
+    """How often each reference lies inside the bands.
+
+    Returns
+    -------
+    source -> channel -> {"50": share of its samples, "95": share}.
+    """
+    found: dict[str, Any] = {}
+    for source in case.reference.compare if case.reference else []:
+        for channel in case.reference.channels if case.reference else []:
+            if channel not in reference[source]:
+                continue
+            time, value, unit = reference[source][channel]
+            if reference.abscissa == "s":
+                # Path length to time by the median flight.
+                time = np.interp(time, np.nanmedian(bands.own.get(source, bands.channels)["s"], axis=0), bands.time)
+            value = in_radians(value, unit)
+            entry = {}
+            for level in LEVELS:
+                low, high = (np.interp(time, bands.time, edge) for edge in bands.band(channel, level, source))
+                entry[level] = float(np.mean((value >= low) & (value <= high)))
+            found.setdefault(source, {})[channel] = entry
+    return found
+
+
+def _scores(draws: Array, correlation: Array) -> Array:
+    """Independent standard scores of correlated draws of one coefficient, (samples, rank)."""
+    values, vectors = np.linalg.eigh(correlation)
+    free = values > _LEAST_VARIANCE * values[-1]
+    scores = draws @ (vectors[:, free] / np.sqrt(values[free]))
+    return np.asarray(scores - scores.mean(axis=0))
+
+
+def variance_shares(bands: Bands, channel: str, most: int = 8) -> list[dict[str, Any]]:
+    """Which coefficients cause the width of a channel's band.
+
+    The share of the variance that a linear function of all values of a coefficient
+    accounts for: the squared correlations of the channel with the coefficient's independent
+    scores, averaged over the record with the variance as weight, less what chance gives
+    (1/samples a score); a share within what chance scatters is left out. Coefficients whose
+    errors are correlated each have what they share, so that the shares may sum to more than one.
+    """
+    values = bands.channels[channel]
+    complete = np.isfinite(values).all(axis=0)
+    spread = values[:, complete] - values[:, complete].mean(axis=0)
+    variance = float((spread**2).sum())
+    if variance == 0.0:
+        return []
+    found: dict[str, float] = {}
+    names = np.array(bands.estimates)
+    for coefficient in dict.fromkeys(bands.estimates):
+        places = np.flatnonzero(names == coefficient)
+        scores = _scores(bands.draws[:, places], bands.correlation[np.ix_(places, places)])
+        square = ((scores.T @ spread) ** 2).sum(axis=1) / (scores**2).sum(axis=0)
+        rank, samples = scores.shape[1], len(values)
+        share = float(square.sum() / variance - rank / samples)
+        # By chance, samples * square / variance is chi-square with a degree of freedom a score.
+        if share > _CHANCE * np.sqrt(2.0 * rank) / samples:
+            found[coefficient] = min(share, 1.0)
+    largest = sorted(found.items(), key=lambda item: -item[1])[:most]
+    return [{"coefficient": name, "share": share} for name, share in largest]
+
+
+def summary(bands: Bands, case: Case, reference: Series) -> dict[str, Any]:
+    """What the JSON result says of the bands."""
+    channels = case.reference.channels if case.reference else []
+    return {
+        "samples": len(bands.draws),
+        "failed": bands.failed,
+        "seed": bands.seed,
+        "inside": inside(bands, case, reference),
+        "variance_shares": {c: variance_shares(bands, c) for c in channels},
+    }
+
+
+def show(found: dict[str, Any], console: Console) -> None:
+    """Print how often the references lie inside, and what makes the bands wide."""
+    from rich.table import Table
+
+    failed = f", {found['failed']} without self-propulsion" if found["failed"] else ""
+    table = Table("reference", "channel", "inside 50 %", "inside 95 %", title=f"{found['samples']} samples{failed}")
+    for source, channels in found["inside"].items():
+        for channel, entry in channels.items():
+            table.add_row(source, channel, f"{100 * entry['50']:.0f} %", f"{100 * entry['95']:.0f} %")
+    console.print(table)
+    table = Table("channel", "variance share by coefficient")
+    for channel, shares in found["variance_shares"].items():
+        table.add_row(channel, ", ".join(f"{s['coefficient']} {100 * s['share']:.0f} %" for s in shares))
+    console.print(table)

@@ -1,0 +1,130 @@
+"""What is flown from a database version: rows read once, every vehicle assembled once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from threading import RLock
+from typing import TYPE_CHECKING
+
+from sim.boat.coefficients import Coefficients
+from sim.boat.database import Version, last_own, read_rows, versions
+from sim.boat.vehicle import Vehicle
+from sim.files.errors import InputError
+from sim.flight.case import Case
+from sim.flight.simulate import environment_of, equipped, water_of
+from sim.kernel.assemble import Environment, assemble
+from sim.kernel.rhs import Model
+from sim.waves.in_waves import Water
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+@dataclass(frozen=True)
+class Boat:
+    """One vehicle with the coefficients of one version.
+
+    Attributes
+    ----------
+    vehicle : From its file.
+    rows : Its database rows.
+    commit : The commit that wrote them.
+    coefficients : The rows as tables.
+    """
+
+    vehicle: Vehicle
+    rows: pd.DataFrame
+    commit: Version
+    coefficients: Coefficients
+    _models: dict[Environment, Model] = field(default_factory=dict)
+    _lock: RLock = field(default_factory=RLock)
+
+    def model(self, case: Case) -> Model:
+        """The model in the environment of a case; raises as ``sim.flight.simulate.equipped``."""
+        environment = environment_of(case)
+        with self._lock:
+            if environment not in self._models:
+                self._models[environment] = assemble(self.coefficients, environment)
+        return equipped(case, self.vehicle, self._models[environment])
+
+    def water(self, case: Case) -> Water | None:
+        """Waves and surface of a case around the boat; raises as ``sim.flight.simulate.water_of``."""
+        return water_of(case, self.coefficients)
+
+
+class Fleet:
+    """Every vehicle of a database version, and of the versions it came from.
+
+    May be shared by threads.
+
+    Parameters
+    ----------
+    db : Database path or URL.
+    version : Version number, latest when None.
+
+    Raises
+    ------
+    InputError
+        When there is no database there, or no such version.
+    """
+
+    def __init__(self, db: str, version: int | None = None) -> None:
+        self.db = db
+        everything, self.number = read_rows(db, version)
+        self._rows = {self.number: everything}
+        self._boats: dict[tuple[int, str], Boat] = {}
+        self._lock = RLock()
+
+    @cached_property
+    def _history(self) -> list[Version]:
+        return versions(self.db)
+
+    @property
+    def record(self) -> Version:
+        """The commit of the version itself."""
+        return next(v for v in self._history if v.number == self.number)
+
+    @property
+    def vehicles(self) -> set[str]:
+        """Names of the vehicles the version holds."""
+        return {str(v) for v in self._rows[self.number]["vehicle"].unique()}
+
+    def boat(self, vehicle: Vehicle) -> Boat:
+        """A vehicle with the coefficients of the version.
+
+        Raises
+        ------
+        InputError
+            When the version has no coefficients of the vehicle.
+        sim.boat.catalogue.CatalogueError
+            When it has some that the vehicle's term set does not.
+        """
+        return self._boat(vehicle, self.number)
+
+    def parent(self, vehicle: Vehicle) -> Boat | None:
+        """The vehicle with the coefficients that its own came from; None when they are the first.
+
+        The commit names its parent; of a calibrated version that is the captive-only one.
+        """
+        named = self.boat(vehicle).commit.metadata.get("parent", "")
+        if not named.isdigit():
+            return None
+        commit = last_own(self._history, vehicle.name, int(named))
+        return self._boat(vehicle, commit.number) if commit else None
+
+    def _boat(self, vehicle: Vehicle, number: int) -> Boat:
+        # A vehicle file may change its numbers and keep its name.
+        key = (number, vehicle.model_dump_json())
+        with self._lock:
+            if key not in self._boats:
+                if number not in self._rows:
+                    self._rows[number] = read_rows(self.db, number)[0]
+                every = self._rows[number]
+                rows = every[every["vehicle"] == vehicle.name].reset_index(drop=True)
+                if rows.empty:
+                    known = ", ".join(sorted(every["vehicle"].unique()))
+                    raise InputError(self.db, f"no coefficients of vehicle {vehicle.name!r}", known)
+                commit = last_own(self._history, vehicle.name, number) or self.record
+                self._boats[key] = Boat(vehicle, rows, commit, Coefficients(vehicle, rows))
+            return self._boats[key]

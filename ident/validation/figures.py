@@ -1,0 +1,261 @@
+"""Figures of flown cases, labelled with units, frame and version."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ident.output import whole
+from ident.validation.bands import Bands
+from ident.validation.validate import Validation
+from sim.boat.database import version_words
+from sim.flight.simulate import CHANNELS, Simulation
+
+Array = NDArray[np.float64]
+FRAME = "frame: x forward, y starboard, z down; psi and r positive to starboard"
+_LABELS = {
+    "psi": "heading psi",
+    "theta": "pitch theta",
+    "phi": "heel phi",
+    "u": "surge speed u",
+    "v": "sway speed v",
+    "w": "heave speed w",
+    "U": "speed U",
+    "p": "roll rate p",
+    "q": "pitch rate q",
+    "r": "yaw rate r",
+    "x": "advance x",
+    "y": "transfer y",
+    "z": "depth of the origin z",
+    "D0": "depth of the sail top D0",
+    "n": "revolutions n",
+    "dV": "vertical command dV",
+    "dH": "horizontal command dH",
+    "ballast": "ballast",
+    "trim_tank": "shift of the centre of gravity",
+    "u_over_U0": "surge speed u/U0",
+    "dz_over_L0": "depth change dz/L",
+}
+_ALONG = {"t": "time t [s]", "s": "path length over ground s [m]"}
+_STYLE = {"EXP": ("k", "o"), "CFD": ("tab:blue", "s")}
+# Depth grows downwards on paper too.
+DOWNWARDS = ("z", "D0")
+_UNITS = CHANNELS | {"dV": "rad", "dH": "rad"}
+_SHOWN = {
+    "turning_circle": ("psi", "D0", "U", "phi"),
+    "direct_spiral": ("dH", "r", "U", "D0"),
+    "reverse_spiral": ("dH", "r", "U", "D0"),
+    "pull_out": ("dH", "r", "psi", "U", "phi", "D0"),
+    "stopping": ("n", "u", "x", "psi", "theta", "D0"),
+    "meander": ("dV", "theta", "q", "D0"),
+    "depth_change": ("dV", "theta", "D0", "U"),
+    "course_keeping": ("dH", "psi", "y", "r"),
+    "rise": ("theta", "q", "D0", "u_over_U0"),
+    "regular_waves": ("D0", "theta", "u", "dV"),
+    "irregular_waves": ("D0", "theta", "phi", "ballast"),
+    "self_propulsion": ("n", "theta", "D0", "ballast"),
+}
+_DEFAULT = ("psi", "theta", "phi", "u", "D0", "r")
+
+
+def _shown(values: Array, unit: str) -> tuple[Array, str]:
+    """Angles in degrees, everything else as it is."""
+    if unit.startswith("rad"):
+        return np.degrees(values), unit.replace("rad", "deg")
+    return values, unit
+
+
+def readable(channel: str, values: Array) -> tuple[Array, str, str]:
+    """A channel of a simulation for people: angles in degrees, and the name of its axis.
+
+    Returns
+    -------
+    values, name, unit.
+    """
+    shown, unit = _shown(values, _UNITS.get(channel, "rad"))
+    return shown, _LABELS.get(channel, channel.replace("_", " ")), unit
+
+
+def _sources(done: Validation) -> list[str]:
+    reference = done.case.reference
+    published = reference.published_model if reference else None
+    return [*(reference.compare if reference else []), *([published] if published else [])]
+
+
+def _line(done: Validation, source: str) -> dict[str, Any]:
+    """How a source is drawn."""
+    if done.case.reference and source == done.case.reference.published_model:
+        return {"color": "tab:green", "lw": 1.2, "ls": "--", "label": f"published model ({source})"}
+    colour, marker = _STYLE.get(source, ("tab:gray", "^"))
+    return {"color": colour, "marker": marker, "ms": 2.5, "lw": 0.6, "markevery": 4, "label": source}
+
+
+def _flights(done: Validation) -> list[tuple[Simulation, dict[str, Any]]]:
+    main = {"color": "tab:red", "lw": 1.6, "label": "simulated from the database"}
+    own = [
+        (flight, {"color": "tab:orange", "lw": 1.2, "ls": "-.", "label": f"simulated as {source} starts"})
+        for source, flight in done.own.items()
+    ]
+    return [(done.simulation, main), *own]
+
+
+def _series(done: Validation, channel: str, axis: Any, bands: Bands | None) -> None:
+    """One channel of the references, the bands and the flights over the abscissa."""
+    along, unit = done.reference.abscissa, _UNITS[channel]
+    for source in _sources(done):
+        if channel in done.reference[source]:
+            place, value, unit = done.reference[source][channel]
+            axis.plot(place, _shown(value, unit)[0], **_line(done, source))
+    if bands and along == "t" and channel in bands.channels:
+        for level, alpha in (("95", 0.15), ("50", 0.3)):
+            low, high = (_shown(edge, _UNITS[channel])[0] for edge in bands.band(channel, level))
+            axis.fill_between(bands.time, low, high, color="tab:red", alpha=alpha, lw=0, label=f"{level} % band")
+    for flight, style in _flights(done):
+        values, unit = _shown(flight[channel], _UNITS[channel])
+        axis.plot(flight[along], values, **style)
+    dress(axis, _ALONG[along], f"{_LABELS.get(channel, channel)} [{unit}]")
+    if channel in DOWNWARDS:
+        axis.invert_yaxis()
+
+
+def pyplot() -> Any:
+    """Matplotlib's pyplot, drawing to files."""
+    import matplotlib as mpl
+
+    mpl.use("Agg")
+    import matplotlib.pyplot as plt
+
+    return plt
+
+
+def finish(figure: Any, path: Path, title: str, stamp: str) -> Path:
+    """Put title, database version and frame on top, write and close.
+
+    Parameters
+    ----------
+    path : File to write; the suffix chooses the format.
+    title : Case and vehicle. stamp : Database version.
+
+    Returns
+    -------
+    ``path``.
+    """
+    figure.suptitle(f"{title}\n{stamp}; {FRAME}", fontsize=10)
+    with whole(path) as part:
+        figure.savefig(part, dpi=120)
+    pyplot().close(figure)
+    return path
+
+
+def dress(axis: Any, x: str, y: str) -> None:
+    """Name the axes of a panel, with a grid."""
+    axis.set_xlabel(x)
+    axis.set_ylabel(y)
+    axis.grid(alpha=0.3)
+
+
+def _track(done: Validation, axis: Any) -> None:
+    """The path over ground, north up, both axes to one scale."""
+    for source in _sources(done):
+        series = done.reference[source]
+        if {"x", "y"} <= set(series):
+            place, x, _ = series["x"]
+            axis.plot(np.interp(place, *series["y"][:2]), x, **_line(done, source))
+    for flight, style in _flights(done):
+        axis.plot(flight["y"], flight["x"], **style)
+    dress(axis, "transfer y, to starboard [m]", "advance x, ahead [m]")
+    axis.set_aspect("equal", adjustable="datalim")
+
+
+def _spiral(done: Validation, axis: Any) -> None:
+    """Steady yaw rate against rudder, in the order flown."""
+    curve = done.result.get("curve", [])
+    rudder, rate = [p["dH_deg"] for p in curve], [p["r_degps"] for p in curve]
+    axis.plot(rudder, rate, color="tab:red", marker="o", ms=4, lw=1.2, label="simulated from the database")
+    axis.axhline(0.0, color="k", lw=0.6)
+    axis.axvline(0.0, color="k", lw=0.6)
+    dress(axis, "horizontal command dH [deg]", "steady yaw rate r [deg/s]")
+
+
+def _grid(done: Validation, axes: Any) -> None:
+    """Self-propulsion over speed, one line a depth."""
+    names = {
+        "n_rps": "revolutions n [1/s]",
+        "dV_deg": "dV [deg]",
+        "ballast_kg": "ballast [kg]",
+        "pitch_deg": "pitch [deg]",
+    }
+    grid = done.result["grid"]
+    for axis, (key, label) in zip(axes, names.items(), strict=True):
+        for depth in sorted({p["depth_m"] for p in grid}):
+            points = [p for p in grid if p["depth_m"] == depth and p[key] is not None]
+            axis.plot([p["speed_mps"] for p in points], [p[key] for p in points], marker="o", label=f"D0 = {depth:g} m")
+        dress(axis, "speed U [m/s]", label)
+    for value in done.case.published:
+        axes[0].axhline(value.value, color="tab:blue", ls="--", lw=1.0, label=f"{value.source} {value.metric}")
+
+
+def _draw(done: Validation, plt: Any, bands: Bands | None) -> tuple[Any, Any]:
+    """The figure, and the axis that has every label."""
+    kind = done.case.maneuver or ""
+    if done.result.get("grid"):
+        figure, axes = plt.subplots(2, 2, figsize=(11, 7), layout="constrained")
+        _grid(done, np.ravel(axes))
+        return figure, np.ravel(axes)[0]
+    if kind in ("turning_circle", "direct_spiral", "reverse_spiral"):
+        figure = plt.figure(figsize=(13, 7), layout="constrained")
+        spec = figure.add_gridspec(2, 4)
+        main = figure.add_subplot(spec[:, :2])
+        _track(done, main) if kind == "turning_circle" else _spiral(done, main)
+        for channel, place in zip(_SHOWN[kind], (spec[0, 2], spec[0, 3], spec[1, 2], spec[1, 3]), strict=True):
+            _over_time(done, channel, figure.add_subplot(place))
+        return figure, main
+    reference = done.case.reference
+    named = reference.channels if reference and reference.channels else list(_SHOWN.get(kind, _DEFAULT))
+    channels = [c for c in named if c in done.simulation.columns or c in CHANNELS]
+    rows = (len(channels) + 1) // 2
+    columns = min(2, len(channels))
+    figure, axes = plt.subplots(rows, columns, figsize=(11, 2.7 * rows + 0.8), layout="constrained")
+    for channel, axis in zip(channels, np.ravel(axes), strict=False):
+        _series(done, channel, axis, bands)
+    for axis in np.ravel(axes)[len(channels) :]:
+        axis.set_visible(False)
+    return figure, np.ravel(axes)[0]
+
+
+def _over_time(done: Validation, channel: str, axis: Any) -> None:
+    """One channel over time, with the references that have it over time."""
+    unit = _UNITS[channel]
+    if done.reference.abscissa == "t":
+        for source in _sources(done):
+            if channel in done.reference[source]:
+                place, value, own = done.reference[source][channel]
+                axis.plot(place, _shown(value, own)[0], **_line(done, source))
+    for flight, style in _flights(done):
+        values, unit = _shown(flight[channel], _UNITS[channel])
+        axis.plot(flight["t"], values, **style)
+    dress(axis, _ALONG["t"], f"{_LABELS.get(channel, channel)} [{unit}]")
+    if channel in DOWNWARDS:
+        axis.invert_yaxis()
+
+
+def case_figure(done: Validation, path: Path, bands: Bands | None = None) -> Path:
+    """Draw a case: channels over the references; the track of a turn, the curve of a spiral.
+
+    Parameters
+    ----------
+    done : A flown case.
+    path : File to write; the suffix chooses the format.
+    bands : Flown samples, drawn as 50 and 95 % bands.
+
+    Returns
+    -------
+    ``path``.
+    """
+    figure, labelled = _draw(done, pyplot(), bands)
+    handles, labels = labelled.get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=4, frameon=False)
+    return finish(figure, path, f"{done.case.title}, {done.case.vehicle}", version_words(done.result["database"]))

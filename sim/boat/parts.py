@@ -1,0 +1,86 @@
+"""Which terms a vehicle uses, and how the port/starboard mirror maps them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from sim.boat import catalogue
+from sim.boat.catalogue import MIRROR_OUTPUT, Term
+from sim.boat.vehicle import Plane, Vehicle
+
+Point = tuple[float, ...]
+
+
+def vehicle_terms(vehicle: Vehicle) -> tuple[Term, ...]:
+    """The rows of the term table that apply to a vehicle.
+
+    Whole-boat derivatives of added mass only where the vehicle takes its inertia from them;
+    sections only where it has some (they then carry wave loads alone). Terms of planes
+    the vehicle does not have are left out.
+    """
+    out_of_use = "added mass" if vehicle.added_mass == "sections" else ""
+    planes = {p.name for p in vehicle.planes}
+    return tuple(
+        t
+        for t in catalogue.terms(vehicle.term_set)
+        if t.group != out_of_use and (t.part in ("hull", "propeller", "section") or t.part in planes)
+    )
+
+
+def parts_of(term: Term, vehicle: Vehicle) -> list[str]:
+    """The parts that carry a coefficient of this term: one, or every section."""
+    if term.part != "section":
+        return [term.part]
+    return [s.name for s in vehicle.sections.centres] if vehicle.sections else []
+
+
+@dataclass(frozen=True)
+class Mirror:
+    """The mirror image of a coefficient: which term, with which sign and axis signs."""
+
+    name: str
+    part: str
+    sign: int
+    axis_signs: tuple[int, ...]
+
+    def point(self, point: Point) -> Point:
+        """The tabulated point seen in the mirror."""
+        return tuple(s * x + 0.0 for s, x in zip(self.axis_signs, point, strict=True))
+
+
+def _deflection_sign(plane: Plane, partner: Plane) -> int:
+    """+1 when the mirrored plane deflects with the same sign as its partner."""
+    mirrored = plane.lift_axis * np.array([1.0, -1.0, 1.0])
+    return 1 if float(mirrored @ partner.lift_axis) > 0 else -1
+
+
+def mirror_of(term: Term, part: str, vehicle: Vehicle) -> Mirror:
+    """How the port/starboard mirror maps a coefficient.
+
+    Parameters
+    ----------
+    term, part : The coefficient and the part that carries it.
+    vehicle : For the partner of a plane.
+
+    Returns
+    -------
+    Mirror with C_mirror(axis_signs * x) = sign * C(x).
+    """
+    planes = {p.name: p for p in vehicle.planes}
+    if part not in planes:
+        signs = tuple(catalogue.axes()[a].mirror for a in term.axes)
+        return Mirror(term.name, part, term.mirror_sign(), signs)
+    partner = planes[planes[part].mirror]
+    turn = _deflection_sign(planes[part], partner)
+    sign = MIRROR_OUTPUT[term.output]
+    for factor in term.factors:
+        sign *= turn if factor == "deflection" else -1 if factor in catalogue.MIRRORED_FACTORS else 1
+    like = [
+        t
+        for t in catalogue.terms(vehicle.term_set)
+        if t.part == partner.name and t.output == term.output and t.factors == term.factors
+    ]
+    signs = tuple(turn if a == "delta" else catalogue.axes()[a].mirror for a in term.axes)
+    return Mirror(like[0].name, partner.name, sign, signs)

@@ -1,0 +1,273 @@
+"""A vehicle is data: particulars, planes, propeller, sections and its term set."""
+
+from __future__ import annotations
+
+import tomllib
+from importlib.resources import files
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import AfterValidator, Field, field_validator
+
+from sim.files.errors import InputError
+from sim.files.frames import PROGRAM, Frame
+from sim.files.schema import Data, FrameData, checked
+
+Vector = Annotated[list[float], Field(min_length=3, max_length=3)]
+
+
+class Number(Data):
+    """A number with its unit and where it comes from."""
+
+    value: float
+    unit: str
+    source: str
+
+
+class Triple(Data):
+    """A vector with its unit and where it comes from."""
+
+    value: Vector
+    unit: str
+    source: str
+
+
+class Limits(Data):
+    """A lower and an upper limit with unit and source."""
+
+    value: Annotated[list[float], Field(min_length=2, max_length=2)]
+    unit: str
+    source: str
+
+
+def _stated(unit: str, positive: bool = False) -> AfterValidator:
+    """Numbers are taken as they are: what states another unit, or a size that is none, is refused."""
+
+    def check(given: Number | Triple | Limits) -> Number | Triple | Limits:
+        if given.unit != unit:
+            raise ValueError(f"unit {unit!r}, and the value in it")
+        if positive and isinstance(given, Number) and not given.value > 0.0:
+            raise ValueError("a value above zero")
+        if isinstance(given, Limits) and not given.value[0] < given.value[1]:
+            raise ValueError("the lower limit, then the upper one")
+        return given
+
+    return AfterValidator(check)
+
+
+Length = Annotated[Number, _stated("m", positive=True)]
+Mass = Annotated[Number, _stated("kg", positive=True)]
+Place = Annotated[Triple, _stated("m")]
+
+
+class Particulars(Data):
+    """Mass, inertia and reference points; positions from the body origin."""
+
+    length: Length
+    mass: Mass
+    displaced_mass: Mass
+    radius_of_gyration: Place
+    centre_of_gravity: Place
+    centre_of_buoyancy: Place
+    sail_top: Place
+
+
+class Propeller(Data):
+    """Propeller diameter, the limits of its revolutions, and where it is (waves need that)."""
+
+    name: str
+    diameter: Length
+    limits: Annotated[Limits, _stated("rps")]
+    rate: Annotated[Number, _stated("rps/s", positive=True)]
+    position: Place | None = None
+
+
+class Mixer(Data):
+    """Share of the vertical and horizontal command in a plane's deflection, Eq. (1)."""
+
+    dV: float
+    dH: float
+
+
+class Plane(Data):
+    """One control plane: where it is, how it turns, what limits it."""
+
+    name: str
+    where: str
+    position: Vector
+    span_axis: Vector
+    leading_edge: Vector
+    mirror: str
+    mixer: Mixer
+    limit_deg: Annotated[float, Field(gt=0)]
+    rate_degps: Annotated[float, Field(gt=0)]
+    source: str
+
+    @property
+    def lift_axis(self) -> np.ndarray:
+        """Unit normal n = b x p along which positive deflection lifts, Eq. (32)."""
+        normal = np.cross(self.span_axis, self.leading_edge)
+        return normal / np.linalg.norm(normal)
+
+
+class Section(Data):
+    """Centre of one added-mass section."""
+
+    name: str
+    position: Vector
+
+
+class Sections(Data):
+    """The added-mass sections of Table 6."""
+
+    source: str
+    centres: list[Section]
+
+
+class BallastTank(Data):
+    """Water taken in and pumped out: where, how much, how fast."""
+
+    position: Place
+    limit: Mass
+    rate: Annotated[Number, _stated("kg/s", positive=True)]
+
+
+class TrimTank(Data):
+    """Water moved along the boat, as the shift of the centre of gravity: how far, how fast."""
+
+    limit: Length
+    rate: Annotated[Number, _stated("m/s", positive=True)]
+
+
+class Tanks(Data):
+    """Ballast and trim tank, Eq. (11)."""
+
+    ballast: BallastTank
+    trim: TrimTank
+
+
+class Axes(FrameData):
+    """Declared directions of the body axes and what the origin is."""
+
+    origin: str
+
+
+class Vehicle(Data):
+    """A vehicle file, turned to the program frame by ``load_vehicle``.
+
+    ``geometry`` names its surface (``sim.hull.surface``), relative to the vehicle file; waves need it.
+    """
+
+    name: str
+    title: str
+    source: str
+    term_set: Literal["reduced", "gertler_hagen", "mmg"]
+    added_mass: Literal["sections", "derivatives"]
+    frame: Axes
+    particulars: Particulars
+    propeller: Propeller
+    planes: list[Plane] = Field(default_factory=list)
+    sections: Sections | None = None
+    tanks: Tanks | None = None
+    geometry: str | None = None
+
+    @field_validator("planes")
+    @classmethod
+    def _mirrors_exist(cls, planes: list[Plane]) -> list[Plane]:
+        names = {p.name for p in planes}
+        for plane in planes:
+            if plane.mirror not in names:
+                raise ValueError(f"plane {plane.name} mirrors {plane.mirror!r}, which is not a plane")
+        return planes
+
+    def turned(self, frame: Frame) -> Vehicle:
+        """The same vehicle described in another frame (program frame to ``frame`` or back)."""
+        data: dict[str, Any] = self.model_dump()
+        signs = [self.frame.frame.signs[a] * frame.signs[a] for a in "xyz"]
+
+        def turn(vector: list[float]) -> list[float]:
+            return [s * v + 0.0 for s, v in zip(signs, vector, strict=True)]
+
+        data["frame"].update(x=frame.x, y=frame.y, z=frame.z)
+        for key in ("centre_of_gravity", "centre_of_buoyancy", "sail_top"):
+            data["particulars"][key]["value"] = turn(data["particulars"][key]["value"])
+        if data["tanks"]:
+            tank = data["tanks"]["ballast"]["position"]
+            tank["value"] = turn(tank["value"])
+        if data["propeller"]["position"]:
+            data["propeller"]["position"]["value"] = turn(data["propeller"]["position"]["value"])
+        for plane in data["planes"]:
+            for key in ("position", "span_axis", "leading_edge"):
+                plane[key] = turn(plane[key])
+        for section in (data["sections"] or {"centres": []})["centres"]:
+            section["position"] = turn(section["position"])
+        return Vehicle.model_validate(data)
+
+    def part_names(self) -> list[str]:
+        """Every part of the boat that a run may carry loads of."""
+        sections = [s.name for s in self.sections.centres] if self.sections else []
+        return ["hull", "propeller", *[p.name for p in self.planes], *sections]
+
+
+def bundled(kind: str) -> list[str]:
+    """Names of the bundled ``vehicles`` or ``cases``."""
+    return sorted(p.name[:-5] for p in (files("sim") / kind).iterdir() if p.name.endswith(".toml"))
+
+
+def read_toml(name: str | Path, kind: str, named_in: str = "") -> tuple[dict[str, Any], str]:
+    """A bundled name or a path to a TOML file, as data and the name to report.
+
+    Parameters
+    ----------
+    name : The name or path.
+    kind : ``vehicles`` or ``cases``; empty where none are bundled.
+    named_in : File and key that name it, for the message.
+
+    Raises
+    ------
+    InputError
+        When neither a bundled file nor a readable TOML file of that name exists.
+    """
+    path = Path(name)
+    if kind and path.suffix != ".toml" and str(name) in bundled(kind):
+        return tomllib.loads((files("sim") / kind / f"{name}.toml").read_text("utf-8")), str(name)
+    try:
+        there = path.is_file()
+    except OSError:
+        there = False
+    if not there:
+        found, text = "no such file", "a path to a .toml file"
+        if kind:
+            found, text = "no such file or bundled name", f"one of {', '.join(bundled(kind))}, or a path"
+        if named_in:
+            raise InputError(named_in, f"{str(name)[:200]!r}: {found}", text)
+        raise InputError(str(name)[:200], found, text)
+    try:
+        return tomllib.loads(path.read_text("utf-8")), str(path)
+    except (OSError, ValueError, RecursionError) as error:
+        raise InputError(str(path), f"not TOML: {error}", "a TOML file in UTF-8") from error
+
+
+def load_vehicle(name: str | Path = "bb2", beside: str | Path = "") -> Vehicle:
+    """Read a vehicle and turn it to the program frame.
+
+    Parameters
+    ----------
+    name : Bundled name or path to a vehicle file.
+    beside : File that names the vehicle; a path is relative to its folder.
+
+    Raises
+    ------
+    InputError
+        For a missing file, a missing or unknown key, or a value out of range.
+    """
+    path = Path(name)
+    there = Path(beside).parent / path if path.suffix == ".toml" else name
+    data, where = read_toml(there, "vehicles", f"{beside}, key vehicle" if str(beside) else "")
+    vehicle = checked(Vehicle, data, where)
+    vehicle.frame.declared(where)
+    if vehicle.geometry is not None:
+        folder = Path(where).parent if Path(where).suffix == ".toml" else Path(str(files("sim") / "vehicles"))
+        vehicle.geometry = str(folder / vehicle.geometry)
+    return vehicle.turned(PROGRAM)

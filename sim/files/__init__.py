@@ -1,0 +1,1 @@
+"""What data files share: strict schemas, frames, errors that say where."""

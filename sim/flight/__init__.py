@@ -1,0 +1,1 @@
+"""Maneuver cases flown: commands, trim, events, the stepped plant."""

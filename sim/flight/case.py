@@ -1,0 +1,377 @@
+"""A maneuver case is data: initial state, environment, commands, references, tolerances."""
+
+from __future__ import annotations
+
+import math
+from importlib.resources import files
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, model_validator
+
+from sim.boat.vehicle import bundled, read_toml
+from sim.files.errors import InputError
+from sim.files.frames import Frame
+from sim.files.schema import Data, FrameData, checked
+from sim.flight.commands import Commands, Event
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+Array = NDArray[np.float64]
+Positive = Annotated[float, Field(gt=0)]
+
+Maneuver = Literal[
+    "turning_circle",
+    "direct_spiral",
+    "reverse_spiral",
+    "pull_out",
+    "stopping",
+    "meander",
+    "depth_change",
+    "course_keeping",
+    "rise",
+    "self_propulsion",
+    "regular_waves",
+    "irregular_waves",
+]
+
+# A record of more steps than this does not fit a laptop's memory.
+_MOST_STEPS = 1e7
+
+
+class EnvironmentData(Data):
+    """Water density and gravity.
+
+    ``free_surface``: the hull may come out of the water and loses buoyancy and added mass
+    there; always so in waves, which need the vehicle's geometry alike.
+    """
+
+    density_kgpm3: Positive
+    gravity_mps2: Positive
+    free_surface: bool = False
+
+
+class WavesData(Data):
+    """Waves of a case.
+
+    A regular wave has ``height_m`` from crest to trough and ``length_m`` or ``period_s``; a
+    spectrum has ``sea_state`` (``sim/data/sea_states.csv``) or its significant ``height_m`` and
+    peak ``period_s``. ``direction_deg``: where the waves travel to, clockwise from north; a
+    case starts along north, so 180 is a head sea. ``phase_deg`` of a regular wave: zero puts a
+    crest at the earth origin at the start. ``spreading``: s of cos^2s of half the angle; zero
+    is long-crested. ``second_order``: with mean drift forces and suction.
+    """
+
+    kind: Literal["regular", "bretschneider", "jonswap"]
+    direction_deg: float
+    sea_state: int | None = None
+    height_m: Annotated[float, Field(ge=0)] | None = None
+    length_m: Positive | None = None
+    period_s: Positive | None = None
+    phase_deg: float = 0.0
+    components: Annotated[int, Field(ge=1, le=5000)] = 200
+    seed: Annotated[int, Field(ge=0)] = 1
+    second_order: bool = True
+    spreading: Annotated[float, Field(ge=0)] = 0.0
+    gamma: Annotated[float, Field(ge=1)] = 3.3
+
+    @model_validator(mode="after")
+    def _one_size(self) -> WavesData:
+        if self.kind == "regular":
+            if self.sea_state is not None:
+                raise ValueError("a regular wave has height_m, and length_m or period_s; no sea_state")
+            if self.height_m is None or (self.length_m is None) == (self.period_s is None):
+                raise ValueError("a regular wave needs height_m, and one of length_m and period_s")
+            return self
+        if self.length_m is not None:
+            raise ValueError("a spectrum has a peak period_s, no length_m")
+        if self.phase_deg:
+            raise ValueError("phase_deg is for a regular wave; the phases of a spectrum come from its seed")
+        given = (self.height_m is not None, self.period_s is not None)
+        if given != ((False, False) if self.sea_state is not None else (True, True)):
+            raise ValueError("a spectrum needs sea_state, or height_m and period_s")
+        return self
+
+
+class Initial(Data):
+    """Initial state: solved self-propulsion, or the given speed as it is.
+
+    ``trim`` says what keeps a self-propelled boat level: the planes and the pitch that they
+    need; planes and ballast at no pitch; or ballast and trim tank at no pitch and no planes.
+    ``upright``: weight has been shifted across a self-propelled boat against the propeller's
+    torque, as is done before a test.
+    """
+
+    state: Literal["self_propulsion", "as_given"]
+    speed_mps: Annotated[float, Field(ge=0)]
+    depth_m: float
+    heel_deg: float = 0.0
+    pitch_deg: float = 0.0
+    revolutions_rps: float | None = None
+    trim: Literal["planes", "ballast", "tanks"] = "planes"
+    upright: bool = False
+
+    @model_validator(mode="after")
+    def _propelled_boats_move(self) -> Initial:
+        if self.state == "self_propulsion" and self.speed_mps == 0.0:
+            raise ValueError("self_propulsion needs a speed; use as_given for a boat at rest")
+        return self
+
+
+class Run(Data):
+    """Duration, control sample (and integration step), time between records; events that end it."""
+
+    duration_s: Annotated[float, Field(gt=0, le=1e5)]
+    step_s: Annotated[float, Field(gt=0, le=10.0)]
+    record_s: Positive
+    stop: list[Event] = Field(default_factory=list)
+
+    @model_validator(mode="after")
+    def _a_run_of_a_size(self) -> Run:
+        if self.duration_s / self.step_s > _MOST_STEPS:
+            raise ValueError(f"more than {_MOST_STEPS:g} steps")
+        if self.record_s < self.step_s:
+            raise ValueError("record_s is shorter than step_s")
+        if self.record_s > self.duration_s:
+            raise ValueError("record_s is longer than duration_s: the record would hold the start alone")
+        return self
+
+
+class Start(Data):
+    """How the record of one source starts, where it is not as the case starts."""
+
+    source: str
+    speed_mps: Annotated[float, Field(gt=0)] | None = None
+    depth_m: float | None = None
+    heel_deg: float | None = None
+    pitch_deg: float | None = None
+    revolutions_rps: float | None = None
+
+
+class Reference(Data):
+    """Where the reference series are and what to compare with them.
+
+    Without ``file`` the case has no bundled reference, and users bring their own.
+    ``abscissa``: the series are over time, or over the path length over ground.
+    ``initial``: sources that are compared with a run from their own start.
+    ``from_start``: channels that are changes since the start, so that every series begins at
+    zero whatever offset it was published with.
+    """
+
+    file: str | None = None
+    published_model: str | None = None
+    compare: list[str] = Field(default_factory=list)
+    channels: list[str] = Field(default_factory=list)
+    abscissa: Literal["t", "s"] = "t"
+    frame: FrameData
+    initial: dict[str, Start] = Field(default_factory=dict)
+    from_start: list[str] = Field(default_factory=list)
+
+
+class Sweep(Data):
+    """Speeds and depths at which self-propulsion is solved, each with each."""
+
+    speed_mps: Annotated[list[Positive], Field(min_length=1)]
+    depth_m: Annotated[list[float], Field(min_length=1)]
+
+
+class Published(Data):
+    """A published value of one metric, and the relative deviation that is accepted.
+
+    ``sigma``: standard error of reading it, in its unit.
+    """
+
+    metric: str
+    source: str
+    value: float
+    unit: str
+    note: str
+    sigma: Annotated[float, Field(ge=0)] | None = None
+    tolerance: Positive | None = None
+
+
+class Tolerance(Data):
+    """Largest accepted RMSE of one channel against one source."""
+
+    source: str
+    channel: str
+    rmse: Positive
+    unit: str
+
+
+class Case(Data):
+    """A maneuver case file. ``maneuver`` names the metrics; zigzags and roll decays need none."""
+
+    name: str
+    title: str
+    vehicle: str
+    source: str
+    maneuver: Maneuver | None = None
+    sail_planes: bool = True
+    environment: EnvironmentData
+    waves: WavesData | None = None
+    initial: Initial
+    run: Run
+    command: Commands
+    sweep: Sweep | None = None
+    reference: Reference | None = None
+    published: list[Published] = Field(default_factory=list)
+    tolerance: list[Tolerance] = Field(default_factory=list)
+
+    @model_validator(mode="after")
+    def _starts_below_the_surface(self) -> Case:
+        starts: list[Initial | Start] = [self.initial, *(self.reference.initial.values() if self.reference else [])]
+        depths = [s.depth_m for s in starts if s.depth_m is not None] + (self.sweep.depth_m if self.sweep else [])
+        if min(depths) < 0.0 and not (self.environment.free_surface or self.waves):
+            text = f"depth_m {min(depths):g} has the sail top above the surface; D0 is positive down, 0 or more"
+            raise ValueError(f"{text}, or free_surface = true in [environment]")
+        return self
+
+    def started_as(self, source: str) -> Case | None:
+        """This case from the start of one source's record; None when it is the case's own."""
+        start = self.reference.initial.get(source) if self.reference else None
+        if start is None:
+            return None
+        moved = start.model_dump(exclude_none=True, exclude={"source"})
+        return self.model_copy(update={"initial": self.initial.model_copy(update=moved)})
+
+
+class Series:
+    """Reference series by source and channel, in the program frame.
+
+    ``self[source][channel]`` is (abscissa, value, unit): time [s] or path length [m].
+    ``sigma[source][channel]`` is the standard error of reading the value, where stated.
+    """
+
+    def __init__(
+        self,
+        data: dict[str, dict[str, tuple[Array, Array, str]]],
+        abscissa: Literal["t", "s"] = "t",
+        sigma: dict[str, dict[str, Array]] | None = None,
+    ) -> None:
+        self.data = data
+        self.abscissa = abscissa
+        self.sigma = sigma or {}
+
+    def __getitem__(self, source: str) -> dict[str, tuple[Array, Array, str]]:
+        return self.data.get(source, {})
+
+
+def in_radians(value: Array, unit: str) -> Array:
+    """Values of a reference series in the simulation's unit: degrees become radians."""
+    return np.radians(value) if unit.startswith("deg") else value
+
+
+def load_case(name: str | Path) -> tuple[Case, str]:
+    """A bundled case or a path to one.
+
+    Returns
+    -------
+    The case and the folder-relative name for messages.
+
+    Raises
+    ------
+    InputError
+        For a missing file, a missing or unknown key, or a value out of range.
+    """
+    data, where = read_toml(name, "cases")
+    return checked(Case, data, where), where
+
+
+def _numbers(table: pd.DataFrame, column: str, path: Path) -> None:
+    """Make a column numbers; only values may be negative. Raises ``InputError`` naming the row that is not."""
+    import pandas as pd
+
+    numbers = pd.to_numeric(table[column], errors="coerce").astype(float)
+    least = -math.inf if column == "value" else 0.0
+    bad = np.flatnonzero(~np.isfinite(numbers) | (numbers < least))
+    if bad.size:
+        place, given = f"{path}, row {bad[0] + 2}, column {column}", table[column].iloc[bad[0]]
+        allowed = "a finite number" if column == "value" else "a finite number, zero or more"
+        raise InputError(place, "nothing or nan" if pd.isna(given) else repr(str(given)), allowed)
+    table[column] = numbers
+
+
+def _from_start(series: Series, channels: list[str]) -> Series:
+    """The series with the listed channels beginning at zero."""
+    for own in series.data.values():
+        for channel in channels:
+            if channel in own:
+                along, value, unit = own[channel]
+                own[channel] = (along, value - value[0], unit)
+    return series
+
+
+def read_series(path: Path, abscissa: Literal["t", "s"], frame: Frame) -> Series:
+    """Read reference series and turn them to the program frame.
+
+    Parameters
+    ----------
+    path : CSV with the columns source, channel, t or s, value, unit, and, optional, sigma.
+    abscissa : Column over which the series are given.
+    frame : Axis directions of the file.
+
+    Raises
+    ------
+    InputError
+        For a missing file or column, or a non-number.
+    """
+    import pandas as pd
+
+    try:
+        table = pd.read_csv(path, dtype={"source": str, "channel": str, "unit": str})
+    except (ValueError, pd.errors.ParserError) as error:
+        raise InputError(str(path), f"not a table: {error}", "a CSV file with a header") from error
+    for column in ("source", "channel", abscissa, "value", "unit"):
+        if column not in table:
+            raise InputError(str(path), f"column {column} missing", f"source, channel, {abscissa}, value, unit")
+    for column in ("source", "channel", "unit"):
+        blank = np.flatnonzero(table[column].isna())
+        if blank.size:
+            raise InputError(f"{path}, row {blank[0] + 2}, column {column}", "nothing", f"a {column}")
+    for column in (abscissa, "value", *(["sigma"] if "sigma" in table else [])):
+        _numbers(table, column, path)
+    data: dict[str, dict[str, tuple[Array, Array, str]]] = {}
+    sigma: dict[str, dict[str, Array]] = {}
+    for (source, channel), rows in table.groupby(["source", "channel"], sort=False):
+        along = rows[abscissa].to_numpy(dtype=float)
+        if np.any(np.diff(along) <= 0.0):
+            raise InputError(f"{path}, {source} {channel}", f"column {abscissa} not increasing", "increasing values")
+        units = rows["unit"].unique()
+        if len(units) > 1:
+            raise InputError(f"{path}, {source} {channel}", f"units {', '.join(units)}", "one unit a series")
+        value = rows["value"].to_numpy(dtype=float) * frame.sign(str(channel))
+        data.setdefault(str(source), {})[str(channel)] = (along, value, str(units[0]))
+        if "sigma" in rows:
+            sigma.setdefault(str(source), {})[str(channel)] = rows["sigma"].to_numpy(dtype=float)
+    return Series(data, abscissa, sigma)
+
+
+def load_reference(case: Case, where: str) -> Series:
+    """Reference series of a case, turned to the program frame.
+
+    Parameters
+    ----------
+    case : With a reference or without.
+    where : As returned by ``load_case``; its folder holds the reference file.
+
+    Raises
+    ------
+    InputError
+        For a missing file or column, a non-number, or an undeclared frame.
+    """
+    if case.reference is None:
+        return Series({})
+    frame = case.reference.frame.declared(f"{where}, key reference.frame")
+    if case.reference.file is None:
+        return Series({}, case.reference.abscissa)
+    if where in bundled("cases"):
+        path = Path(str(files("sim") / "cases" / case.reference.file))
+    else:
+        path = Path(where).parent / case.reference.file
+    if not path.is_file():
+        raise InputError(str(path), "missing", f"the reference file of case {case.name}")
+    return _from_start(read_series(path, case.reference.abscissa, frame), case.reference.from_start)

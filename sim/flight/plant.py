@@ -1,0 +1,191 @@
+"""A boat to be stepped from outside: your own controller, the simulator's boat, actuators and water."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.boat.coefficients import Coefficients
+from sim.boat.database import read_rows
+from sim.boat.vehicle import load_vehicle
+from sim.files.errors import InputError
+from sim.flight import maneuver
+from sim.flight.case import Case, load_case
+from sim.flight.commands import Commands, PlaneCommand, SpeedCommand
+from sim.flight.events import progress
+from sim.flight.simulate import TANKS, columns_of, initial_state, model_of, settings_of, uses_tanks, water_of
+from sim.kernel.assemble import weight_across
+from sim.kernel.rhs import workspace
+from sim.waves.in_waves import surroundings
+
+Array = NDArray[np.float64]
+
+COMMANDS = ("dV", "dH", "n", *TANKS)
+
+
+def _open_loop(case: Case) -> Case:
+    """The case without its own control and the events that end it; what the tanks hold stays."""
+    fixed = PlaneCommand(law="fixed")
+    commands = Commands(
+        dV=fixed,
+        dH=fixed,
+        n=SpeedCommand(law="fixed", limits_rps=case.command.n.limits_rps),
+        ballast=case.command.ballast,
+        trim_tank=case.command.trim_tank,
+    )
+    return case.model_copy(update={"command": commands, "run": case.run.model_copy(update={"stop": []})})
+
+
+class Plant:
+    """A boat that moves by your commands, a control sample at a time.
+
+    Commands go through the mixer, Eq. (1), and the actuators: planes, revolutions and tanks
+    move at their rates within their limits, as in every simulated maneuver. Frame x forward, y
+    starboard, z down; SI and radians.
+
+    Parameters
+    ----------
+    case : Initial state, water, waves, and step; its own control and events are left out.
+    coefficients : Of the vehicle.
+
+    Attributes
+    ----------
+    dt : Control sample and integration step [s].
+    time : Now [s].
+    state : (12,) u v w p q r [m/s, rad/s], x y z [m], phi theta psi [rad].
+    controls : (planes + 1,) deflections [rad] and n [1/s] as they are; with tanks also ballast
+        [kg] and the shift of the centre of gravity [m].
+    commands : dV, dH [rad], n [1/s] and, with tanks, ballast [kg] and trim_tank [m] as last given.
+    trim : The equilibrium it starts from, ``sim.flight.trim.Trim``, or None.
+
+    Raises
+    ------
+    InputError
+        As ``sim.flight.simulate.model_of`` and ``water_of``.
+    sim.flight.trim.NoEquilibrium
+        When the case starts from self-propulsion and there is none.
+    """
+
+    def __init__(self, case: Case, coefficients: Coefficients) -> None:
+        self.vehicle, self.dt = coefficients.vehicle, case.run.step_s
+        self._case, self._water = _open_loop(case), water_of(case, coefficients)
+        model = model_of(case, coefficients)
+        self._start, self._moved, self.trim = initial_state(case, self.vehicle, model)
+        self._model = weight_across(model, self.trim.lateral) if self.trim and self.trim.lateral else model
+        self._settings = settings_of(self._case, self.vehicle, self._start, self._moved, self.trim)
+        self._columns = columns_of(self.vehicle, uses_tanks(case))[1:-2]
+        self.reset()
+
+    @classmethod
+    def from_database(cls, case: str, db: str, version: int | None = None, vehicle: str | None = None) -> Plant:
+        """A boat of a database version in a bundled case or a case file.
+
+        Parameters
+        ----------
+        case : Bundled name or path.
+        db, version : Database, and version, latest when None.
+        vehicle : Bundled name or vehicle file, instead of the case's.
+
+        Raises
+        ------
+        InputError
+            For a case, vehicle, database or version that does not exist or fit.
+        sim.flight.trim.NoEquilibrium
+            When the case starts from self-propulsion and there is none.
+        """
+        data, where = load_case(case)
+        boat = load_vehicle(vehicle) if vehicle else load_vehicle(data.vehicle, beside=where)
+        return cls(data, Coefficients(boat, read_rows(db, version, boat.name)[0]))
+
+    def reset(self) -> None:
+        """Back to the start: time zero, initial state and controls, the commands that hold them."""
+        self.time, self.state, self.controls = 0.0, self._start.copy(), self._moved.copy()
+        planes = len(self.vehicle.planes)
+        level = (self.trim.dV, self.trim.dH) if self.trim else (0.0, 0.0)
+        self.commands = dict(zip(COMMANDS, (*level, *self.controls[planes:].tolist()), strict=False))
+        around = surroundings(self._water, self._model) if self._water else ()
+        self._work = workspace(planes, around)
+
+    def __getitem__(self, channel: str) -> float:
+        """A state, a plane, n, ballast or trim_tank by name; ``t``, ``U`` and ``D0`` too.
+
+        Raises
+        ------
+        KeyError
+            Naming the channels there are.
+        """
+        values = dict(zip(self._columns, (*self.state, *self.controls), strict=True))
+        values |= {"t": self.time, "U": float(np.linalg.norm(self.state[:3]))}
+        values["D0"] = float(self.state[8]) + self._model.sail_top
+        if channel not in values:
+            raise KeyError(f"{channel}; there are {', '.join(values)}")
+        return float(values[channel])
+
+    def step(self, steps: int = 1, **commands: float) -> Array:
+        """Give commands and move on; commands that are not given stay as they are.
+
+        Parameters
+        ----------
+        steps : Control samples of ``dt``, during which the commands stand.
+        commands : ``dV``, ``dH`` [rad], ``n`` [1/s], ``ballast`` [kg], ``trim_tank`` [m].
+
+        Returns
+        -------
+        (12,) a copy of the state after them.
+
+        Raises
+        ------
+        InputError
+            For a command that the boat does not have, that is not finite, or an angle beyond pi.
+        FloatingPointError
+            When the state leaves the finite numbers.
+        """
+        if steps < 1:
+            raise InputError("plant, steps", f"{steps}", "one control sample or more")
+        for name, value in commands.items():
+            self._check(name, value)
+        self.commands |= {name: float(value) for name, value in commands.items()}
+        settings = self._commanded()
+        record, executes, log = np.zeros((1, 15 + self.controls.size)), np.zeros((1, 2)), np.zeros((1, 3))
+        state = progress(settings.programme, self.state)
+        self.time = maneuver.run(
+            self._model,
+            settings,
+            state,
+            self.state,
+            self.controls,
+            self.dt,
+            steps,
+            steps,
+            self._work,
+            record,
+            executes,
+            log,
+            self.time,
+        )[3]
+        if not np.isfinite(self.state).all():
+            raise FloatingPointError(f"the state left the finite numbers after {self.time:.3f} s")
+        return self.state.copy()
+
+    def _check(self, name: str, value: float) -> None:
+        if name not in self.commands:
+            allowed = ", ".join(self.commands)
+            hint = "" if len(self.commands) == len(COMMANDS) else "; tanks with [command.ballast] in the case"
+            raise InputError(f"plant, command {name}", "no such command of this boat", allowed + hint)
+        if not math.isfinite(value):
+            raise InputError(f"plant, command {name}", f"{value}", "a finite number")
+        if name in ("dV", "dH") and abs(value) > math.pi:
+            raise InputError(f"plant, command {name}", f"{value:g}", "radians, between -pi and pi")
+
+    def _commanded(self) -> maneuver.Settings:
+        """The loop's settings with the present commands as fixed ones."""
+        given, limit = self.commands, self._settings.n_limit
+        tanks = [given.get(name, 0.0) for name in TANKS]
+        return self._settings._replace(
+            value=np.array([given["dV"], given["dH"]]),
+            revolutions=float(np.clip(given["n"], limit[0], limit[1])),
+            tank_law=np.zeros(2, dtype=self._settings.tank_law.dtype),
+            tank_start=np.array(tanks),
+        )

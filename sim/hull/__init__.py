@@ -1,0 +1,1 @@
+"""The hull's surface: closed meshes, volumes, emergence, added mass."""

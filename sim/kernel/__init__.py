@@ -1,0 +1,1 @@
+"""The compiled right-hand side and the model it reads."""

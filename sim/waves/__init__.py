@@ -1,0 +1,1 @@
+"""Linear waves and their loads, along the boat's path."""
