@@ -8,7 +8,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from ident.checks.findings import Body, run_table
+from ident.captive.run_table import run_table
+from ident.checks.findings import Body
 
 DATASETS = Path(__file__).parents[2] / "shared" / "datasets"
 HMRI = DATASETS / "kvlcc2_hmri_pmm"

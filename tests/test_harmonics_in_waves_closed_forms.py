@@ -15,8 +15,9 @@ import pytest
 from flights_in_waves import made_flight
 from scipy.signal import lfilter
 
-from ident.metrics.in_waves import harmonics_over_depth, in_waves, regular_waves
+from ident.metrics.in_waves import in_waves, regular_waves
 from ident.metrics.seakeeping import encounter_of, harmonics, harmonics_of
+from ident.validation.wave_case_figures import harmonics_over_depth
 from ident.validation.wave_figures import harmonics_figure
 from sim.files.errors import InputError
 from sim.flight.case import load_case
@@ -233,7 +234,7 @@ def test_harmonics_over_depth_are_drawn_with_their_reading_errors(tmp_path, monk
         given.append((sorted(flown), reference, words[0]))
         return harmonics_figure(flown, reference, path, *words)
 
-    monkeypatch.setattr("ident.validation.wave_figures.harmonics_figure", figure)
+    monkeypatch.setattr("ident.validation.wave_case_figures.harmonics_figure", figure)
     again = _flown(CASES[0], waves, time)
     files = harmonics_over_depth([*done, again], tmp_path)
     assert [f.name for f in files] == ["harmonics_in_waves_v3.png", "harmonics_in_waves_2_v3.png"]

@@ -20,7 +20,8 @@ from click.testing import CliRunner
 
 from ident.captive.campaign import read_campaign
 from ident.cli import main
-from ident.identification.identify import Solver, identify
+from ident.identification.identify import identify
+from ident.identification.solver import Solver
 from ident.planning.candidates import Facility, Levels, planned_tests, read_facility
 from ident.planning.design import Design, d_optimal, fewest_runs
 from ident.planning.matrix import matrix

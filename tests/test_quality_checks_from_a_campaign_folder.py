@@ -21,8 +21,9 @@ from hypothesis import strategies as st
 from made_campaigns import CONSTANTS, HEAD, STEADY, campaign, history
 
 from ident.captive.campaign import read_campaign
+from ident.captive.run_table import run_table
 from ident.checks.check import check_campaign
-from ident.checks.findings import Body, Evidence, registered, rules, run_table
+from ident.checks.findings import Body, Evidence, registered, rules
 from ident.cli import main
 from ident.timeseries.clock import Clock
 from sim.boat.vehicle import load_vehicle

@@ -14,8 +14,9 @@ import pandas as pd
 import pytest
 from hmri import DATASETS, HMRI, KVLCC2, PMM, STATIC, needs_datasets, sheet
 
+from ident.captive.run_table import run_table
 from ident.checks.check import read_labels, run
-from ident.checks.findings import Evidence, run_table
+from ident.checks.findings import Evidence
 from ident.checks.histories import time_stamps
 
 

@@ -20,8 +20,6 @@ import pandas as pd
 from ident.captive import published
 from ident.captive.campaign_file import CampaignFile, read_header
 from ident.captive.conversions import (
-    DIRECT,
-    MOTION,
     move_moments,
     standard_errors,
     to_full_scale,
@@ -32,20 +30,16 @@ from ident.captive.conversions import (
 )
 from ident.captive.histories import NotRising, Reduced
 from ident.captive.readers.opening import inputs
-from ident.captive.runs import TEXT, Found, source_runs
+from ident.captive.run_table import DIRECT, NUMBERS, run_table
+from ident.captive.runs import Found, source_runs
 from ident.captive.source import Source
-from ident.checks.findings import run_table
 from sim.boat.catalogue import OUTPUTS
 from sim.boat.vehicle import Vehicle, load_vehicle
 from sim.files.errors import InputError
 from sim.files.frames import Frame
 
-__all__ = ["DIRECT", "MOTION", "TEXT", "Campaign", "CampaignFile", "find_campaigns", "read_campaign", "tests"]
-
 # Further files that one message names.
 _SHOWN = 20
-# Columns every run table has, blank where no file gives them.
-_COLUMNS = ("U", "alpha", "beta", "D0", "plane", "n", "J", "rel_sigma", *MOTION, *OUTPUTS, *DIRECT)
 
 
 @dataclass(frozen=True)
@@ -134,7 +128,7 @@ def read_runs(folder: Path, header: CampaignFile, vehicle: Vehicle) -> tuple[pd.
             _check_words(folder, table, {**words, "decoupled": ["", "True", "False"]})
             _check_complete(folder, table)
     runs = pd.concat(found.tables, ignore_index=True) if found.tables else pd.DataFrame()
-    for column in _COLUMNS:
+    for column in NUMBERS:
         if column not in runs:
             runs[column] = np.nan
     return runs, found

@@ -16,13 +16,12 @@ import pandas as pd
 
 from ident.captive.campaign_file import CampaignFile, Tare
 from ident.captive.quantities import PRIMED, TAKEN, factor
+from ident.captive.run_table import DIRECT, MOTION
 from sim.boat.catalogue import ACCELERATIONS, OUTPUTS
 from sim.boat.forces import body_velocity
 from sim.files.errors import InputError
 from sim.files.frames import Frame
 
-MOTION = ("p", "q", "r", *ACCELERATIONS)
-DIRECT = ("KT", "KQ", "t", "value")
 # Loads that remain for a body symmetric about the plane of a half model, and the motions
 # that keep the flow symmetric about it.
 _DOUBLED = {"port_starboard": ("X", "Z", "M"), "upper_lower": ("X", "Y", "N")}

@@ -12,23 +12,21 @@ import numpy as np
 import pandas as pd
 
 from ident.captive.campaign_file import CampaignFile
-from ident.captive.conversions import DIRECT, MOTION, dimensional, quantity_of
+from ident.captive.conversions import dimensional, quantity_of
 from ident.captive.histories import Channels, NotRising, Pieces, Reduced, reduce, states
 from ident.captive.quantities import Column, column, owner, suffixed
 from ident.captive.readers import openfoam
 from ident.captive.readers.opening import matching, open_sheet, reader_of
 from ident.captive.readers.table import Sheet, columns_of, run_cells
 from ident.captive.readers.text import LARGEST, Dialect
+from ident.captive.run_table import DIRECT, REQUIRED, STATES, TEXT
 from ident.captive.source import NO_COLUMNS, Source
 from ident.captive.subtract import off_samples, off_table, taken_columns
 from sim.boat.catalogue import OUTPUTS
 from sim.files.errors import InputError
 
-TEXT = ("run_id", "test", "part", "quality", "source", "copy_of", "exclude", "reason", "decoupled", "coefficient")
-REQUIRED = ("run_id", "test", "part", "quality", "source")
 _PLAIN = Dialect()
-# What [source.within] can limit, and by how much of itself a limit is widened.
-_STATES = ("U", "alpha", "beta", "D0", "plane", "n", "J", *MOTION)
+# By how much of itself a limit of [source.within] is widened.
 _SLACK = 1e-9
 
 
@@ -114,7 +112,7 @@ def outside_excluded(table: pd.DataFrame, source: Source, where: str) -> pd.Data
     out = table
     for name, (low, high) in source.within.items():
         place = f"{where}, key source.within.{name}"
-        if name not in suffixed() or suffixed()[name][0] not in _STATES:
+        if name not in suffixed() or suffixed()[name][0] not in STATES:
             known = ", ".join(c for c, (q, _) in suffixed().items() if q in ("U", "alpha", "beta", "r"))
             raise InputError(place, "no state of a run with its unit", known + " and the like")
         quantity, factor = suffixed()[name]

@@ -9,7 +9,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from ident.checks.findings import STATE, Array, Evidence, Finding, Rule, check, declared, kept, milder, spans
+from ident.captive.run_table import STATES
+from ident.checks.findings import Array, Evidence, Finding, Rule, check, declared, kept, milder, spans
 from sim.boat.catalogue import MIRROR_OUTPUT, MIRRORED_FACTORS, OUTPUTS
 from sim.boat.vehicle import Vehicle
 
@@ -48,7 +49,7 @@ def mirror_image(runs: pd.DataFrame, vehicle: Vehicle | None) -> pd.DataFrame:
     vehicle : For the partner of a plane and the sense of its deflection.
     """
     image = runs.copy()
-    odd = [c for c in STATE if c == "beta" or c in MIRRORED_FACTORS]
+    odd = [c for c in STATES if c == "beta" or c in MIRRORED_FACTORS]
     image[odd] = -image[odd]
     for output, sign in MIRROR_OUTPUT.items():
         image[output] = sign * image[output]
@@ -74,7 +75,7 @@ def mirror_known(runs: pd.DataFrame, vehicle: Vehicle | None) -> pd.Series:
 
 def state_key(runs: pd.DataFrame) -> pd.Series:
     """A state and its part as a number: equal states have equal keys; a missing motion is zero."""
-    table = pd.DataFrame(_rounded(runs[list(STATE)].to_numpy(float)), columns=list(STATE), index=runs.index)
+    table = pd.DataFrame(_rounded(runs[list(STATES)].to_numpy(float)), columns=list(STATES), index=runs.index)
     return _hashed(table.assign(part=runs["part"]))
 
 
@@ -100,7 +101,7 @@ def _independent(runs: pd.DataFrame) -> pd.DataFrame:
 def _differences(group: pd.DataFrame) -> str:
     """Which states differ within a group, with their values."""
     found = []
-    for column in STATE:
+    for column in STATES:
         values = sorted(set(group[column].dropna()))
         if len(values) > 1:
             shown = np.rad2deg(values) if column in ("alpha", "beta", "plane") else values
@@ -169,7 +170,7 @@ def mirrored_copies(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
 def frozen_column(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
     """One load unchanged in runs of different state while the other loads change."""
     runs = _independent(evidence.runs).copy()
-    odd = [c for c in STATE if c in ("beta", "plane") or c in MIRRORED_FACTORS]
+    odd = [c for c in STATES if c in ("beta", "plane") or c in MIRRORED_FACTORS]
     runs[odd] = runs[odd].abs()
     states, whole = state_key(runs), load_key(runs, rule)
     found: dict[tuple[str, str, bool], list[pd.DataFrame]] = {}
@@ -196,5 +197,5 @@ def frozen_column(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
 
 def _axes(group: pd.DataFrame) -> str:
     """Names of the states that differ within a group."""
-    names = [c for c in STATE if group[c].dropna().nunique() > 1]
+    names = [c for c in STATES if group[c].dropna().nunique() > 1]
     return ", ".join(names + (["part"] if group["part"].nunique() > 1 else []))

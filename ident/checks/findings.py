@@ -13,7 +13,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from sim.boat.catalogue import ACCELERATIONS, OUTPUTS
+from ident.captive.run_table import run_table
 
 if TYPE_CHECKING:
     from ident.captive.campaign import Campaign
@@ -22,9 +22,6 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 SEVERITIES = ("info", "warning", "error")
-DIRECT = ("KT", "KQ", "t")
-STATE = ("U", "alpha", "beta", "D0", "plane", "n", "J", "p", "q", "r", *ACCELERATIONS)
-_TEXT = ("run_id", "test", "part", "quality", "copy_of", "exclude", "file")
 
 
 @dataclass(frozen=True)
@@ -191,24 +188,6 @@ def check(name: str) -> Callable[[Function], Function]:
 def registered() -> dict[str, list[Function]]:
     """The functions of every check, in the order of ``data/checks.csv``."""
     return {name: [f for k, f in _FUNCTIONS.items() if k.split(".")[0] == name] for name in rules()}
-
-
-def run_table(columns: Mapping[str, Any]) -> pd.DataFrame:
-    """A table of your own runs with every column the checks read.
-
-    Parameters
-    ----------
-    columns : As in ``Campaign.runs``: SI, radians, program frame. Missing states and loads
-        are NaN, missing texts empty, ``row`` counts from 2.
-    """
-    table = pd.DataFrame(dict(columns))
-    for name in (*STATE, *OUTPUTS, *DIRECT, "rel_sigma", *(f"s_{o}" for o in (*OUTPUTS, *DIRECT))):
-        table[name] = pd.to_numeric(table[name]).astype(float) if name in table else np.nan
-    for name in _TEXT:
-        table[name] = table[name].astype(str) if name in table else ""
-    if "row" not in table:
-        table["row"] = np.arange(len(table)) + 2
-    return table.reset_index(drop=True)
 
 
 def dynamic(runs: pd.DataFrame, body: Body) -> pd.Series:

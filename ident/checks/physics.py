@@ -12,6 +12,7 @@ import numpy as np
 import pandas as pd
 
 from ident.checks.findings import Body, Evidence, Finding, Rule, check, declared, kept, milder, prime
+from ident.identification.solver import Solver, check_levers
 from sim.boat.catalogue import ACCELERATIONS, OUTPUTS
 
 # Load component that answers each acceleration, and the moment of each cross force.
@@ -126,8 +127,6 @@ def section_levers(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
     """Levers of sections in the runs against those of the vehicle file."""
     if evidence.campaign is None:
         return
-    from ident.identification.identify import Solver, check_levers
-
     solver = Solver(evidence.campaign)
     check_levers(solver)
     runs = evidence.runs

@@ -12,8 +12,10 @@ from importlib.resources import files
 import pandas as pd
 
 from ident.captive.published import TEST as PUBLISHED
-from ident.checks.findings import DIRECT, Evidence, Finding, Rule, check, rules
+from ident.captive.run_table import PROPULSION
+from ident.checks.findings import Evidence, Finding, Rule, check, rules
 from ident.identification.nodes import vanishes
+from ident.identification.solver import Solver
 from sim.boat.catalogue import OUTPUTS
 from sim.boat.parts import parts_of, vehicle_terms
 
@@ -195,8 +197,6 @@ def unsupported_terms(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
     campaign = evidence.campaign
     if campaign is None:
         return
-    from ident.identification.identify import Solver
-
     solver = Solver(campaign)
     seen, own = set(), set()
     for _, run in campaign.runs.iterrows():
@@ -205,8 +205,8 @@ def unsupported_terms(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
             term = solver.by_name[run["coefficient"]]
             own.add(solver.canonical(term.name, run["part"], solver.place(term, features))[0][:2])
             continue
-        given = [o for o in (*OUTPUTS, *DIRECT) if pd.notna(run[o]) and o not in run["exclude"].split()]
-        names = {(o, "propeller") for o in given if o in DIRECT}
+        given = [o for o in (*OUTPUTS, *PROPULSION) if pd.notna(run[o]) and o not in run["exclude"].split()]
+        names = {(o, "propeller") for o in given if o in PROPULSION}
         for output in given:
             for term, _ in solver.active(run, output, features) if output in OUTPUTS else ():
                 key, sign = solver.canonical(term.name, run["part"], solver.place(term, features))

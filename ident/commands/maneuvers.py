@@ -93,7 +93,7 @@ def _sea_figures(done: list[Any], out: Path) -> list[Path]:
     """Further figures of cases in waves."""
     if not any(one.case.waves for one in done):
         return []
-    from ident.metrics.in_waves import harmonics_over_depth, sea_figures
+    from ident.validation.wave_case_figures import harmonics_over_depth, sea_figures
 
     return [figure for one in done for figure in sea_figures(one, out)] + harmonics_over_depth(done, out)
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 from ident.captive.campaign import Campaign
-from ident.captive.conversions import MOTION, tare_applies
+from ident.captive.conversions import tare_applies
+from ident.captive.run_table import MOTION
 from ident.timeseries.reduction import ERROR, TRANSIENT
 from sim.boat.catalogue import OUTPUTS
 from sim.files.frames import PROGRAM, SENSES

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-if TYPE_CHECKING:
-    from ident.identification.identify import Solver
+from ident.identification.solver import Solver
 
 Array = NDArray[np.float64]
 

@@ -1,12 +1,10 @@
-"""Metrics and figures of cases in waves: harmonics, statistics of a seaway, drift of a turn."""
+"""Metrics of cases in waves: harmonics, statistics of a seaway, drift of a turn."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,18 +13,14 @@ from ident.metrics import seakeeping, seaway
 from ident.metrics.exceedance import exceedances, extreme
 from ident.metrics.seakeeping import Harmonics, as_published
 from ident.metrics.seaway import Statistics
-from sim.boat.database import version_words
 from sim.flight.case import Case
 from sim.flight.simulate import Simulation
 from sim.waves.linear import mean_direction
 
-if TYPE_CHECKING:
-    from ident.validation.validate import Validation
-
 Array = NDArray[np.float64]
 Metrics = dict[str, float | None]
-# The sail top at the calm surface: broaching.
-_BROACHING = 0.0
+# Depth of the sail top [m] at the calm surface: broaching.
+BROACHING = 0.0
 _CHANNELS = ("D0", "theta", "phi")
 # An extreme is asked for over the duration of a sea state [h], and passed with this probability.
 _HOURS, _RISK = 3.0, 0.01
@@ -78,7 +72,7 @@ def irregular_waves(found: Mapping[str, Statistics], simulation: Simulation) -> 
     is passed in three hours with 1 %.
     """
     depth, pitch, roll = (found[name] for name in _CHANNELS)
-    broaching = exceedances(depth, [_BROACHING])[0]
+    broaching = exceedances(depth, [BROACHING])[0]
     record = extreme(depth, (depth.end - depth.start) / 3600.0)
     sea_state = extreme(depth, _HOURS, risk=_RISK)
     return {
@@ -129,76 +123,3 @@ def turn_drift(simulation: Simulation) -> Metrics:
     along, across = float(drift @ ahead), float(drift @ [-ahead[1], ahead[0]])
     spread = float(np.std(size, ddof=1) / math.sqrt(len(size)))
     return dict(zip((*names, *sizes), (along, across, error, float(np.mean(size)), spread), strict=True))
-
-
-def sea_figures(done: Validation, folder: Path) -> list[Path]:
-    """Figures of a flown case in an irregular sea: histories, spectra, exceedance of broaching.
-
-    Parameters
-    ----------
-    done : A flown case; of any other there are none.
-    folder : Where to write.
-    """
-    if done.case.maneuver != "irregular_waves" or done.simulation.waves is None:
-        return []
-    from ident.validation.wave_figures import exceedance_figure, seaway_figure, spectrum_figure
-
-    database = done.result["database"]
-    stamp = version_words(database)
-    title, name = f"{done.case.title}, {done.case.vehicle}", f"{done.case.name}_v{database['version']}"
-    found = done.in_waves.statistics
-    met = seaway.encountered(done.simulation.waves, done.simulation, start=found["D0"].start)
-    return [
-        seaway_figure(done.simulation, found, folder / f"{name}_histories.png", title, stamp, _BROACHING),
-        spectrum_figure(found, met, folder / f"{name}_spectra.png", title, stamp),
-        exceedance_figure(found["D0"], folder / f"{name}_broaching.png", title, stamp, "below", _BROACHING),
-    ]
-
-
-def harmonics_over_depth(done: list[Validation], folder: Path) -> list[Path]:
-    """First harmonics over depth of the cases in a regular wave that were flown, beside the published ones.
-
-    Parameters
-    ----------
-    done : Flown cases.
-    folder : Where to write.
-
-    Returns
-    -------
-    A figure for each vehicle and wave; none when no case is in regular waves.
-    """
-    groups: dict[str, list[Validation]] = {}
-    for one in done:
-        if one.in_waves.harmonics and one.case.waves is not None:
-            depth = one.case.initial.depth_m
-            key = f"{one.case.vehicle} {one.case.initial.speed_mps} {one.case.waves.model_dump_json()}"
-            while any(other.case.initial.depth_m == depth for other in groups.get(key, [])):
-                key += " again"
-            groups.setdefault(key, []).append(one)
-    return [_over_depth(group, folder, f"_{i + 1}" if i else "") for i, group in enumerate(groups.values())]
-
-
-def _over_depth(done: list[Validation], folder: Path, suffix: str) -> Path:
-    """The figure of one vehicle in one wave."""
-    import pandas as pd
-
-    from ident.validation.wave_figures import harmonics_figure
-
-    metric = {"dz1_over_aw": "dz1_over_aw", "theta1_deg": "theta1"}
-    rows = [
-        {"source": p.source, "channel": metric[p.metric], "D0_m": d.case.initial.depth_m}
-        | {"value": p.value, "sigma": p.sigma or 0.0}
-        for d in done
-        for p in d.case.published
-        if p.metric in metric
-    ]
-    reference = pd.DataFrame(rows, columns=["source", "channel", "D0_m", "value", "sigma"])
-    flown = {d.case.initial.depth_m: d.in_waves.harmonics for d in done}
-    database, case = done[0].result["database"], done[0].case
-    encounter = next(iter(done[0].in_waves.harmonics.values())).encounter
-    wave = f"waves {2.0 * encounter.amplitude:.3g} m high, {2.0 * math.pi / encounter.number:.4g} m long"
-    # mu is 180 deg in head seas.
-    title = f"{case.vehicle} in regular {wave}, mu = {math.degrees(encounter.angle):.0f} deg"
-    title += f", U = {encounter.speed:.3g} m/s"
-    path = folder / f"harmonics_in_waves{suffix}_v{database['version']}.png"
-    return harmonics_figure(flown, reference, path, title, version_words(database))

@@ -15,7 +15,7 @@ import pandas as pd
 from pydantic import Field, field_validator
 
 from ident.captive.campaign import Campaign
-from ident.checks.findings import STATE, run_table
+from ident.captive.run_table import STATES, run_table
 from sim.boat.parts import parts_of, vehicle_terms
 from sim.boat.vehicle import read_toml
 from sim.files.errors import InputError
@@ -177,11 +177,12 @@ def candidate_runs(campaign: Campaign, facility: Facility) -> pd.DataFrame:
         levels[test] = own if own is not None else levels[test]
     rows = [dict(zip(("test", "part", "why"), key, strict=True)) | state for key, state in _states(campaign, levels)]
     rows = [r for r in rows if r["test"] not in facility.exclude]
-    table = run_table({c: [r.get(c, math.nan) for r in rows] for c in ("test", "part", "why", *STATE)})
+    table = run_table({c: [r.get(c, math.nan) for r in rows] for c in ("test", "part", "why", *STATES)})
     own = campaign.runs
     again = own[~own["test"].isin([*_NOT_PLANNED, *facility.exclude]) & (own["copy_of"] == "")]
-    table = pd.concat([table, again[["test", "part", *STATE]].drop_duplicates().assign(why="value")], ignore_index=True)
-    table = run_table({c: table[c] for c in ("test", "part", "why", *STATE)})
+    again = again[["test", "part", *STATES]].drop_duplicates().assign(why="value")
+    table = pd.concat([table, again], ignore_index=True)
+    table = run_table({c: table[c] for c in ("test", "part", "why", *STATES)})
     return table.assign(run_id=[f"plan-{i}" for i in range(len(table))], file="plan", decoupled="", reason="")
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 from ident.captive.campaign import Campaign, to_full_scale, turn
-from ident.checks.findings import STATE
+from ident.captive.run_table import STATES
 from ident.output import whole
 from ident.planning.plan import Plan
 
@@ -28,7 +28,7 @@ def matrix(plan: Plan, campaign: Campaign) -> pd.DataFrame:
     out = pd.DataFrame(
         {"run_id": [f"P{i + 1:03d}" for i in range(len(table))], "test": table["test"], "part": table["part"]}
     )
-    for name in STATE:
+    for name in STATES:
         if table[name].notna().any():
             unit = "deg" if name in _ANGLES else _UNITS.get(name, "radps2" if name[0] in "pqr" else "mps2")
             values = np.rad2deg(table[name]) if name in _ANGLES else table[name]

@@ -17,9 +17,11 @@ import numpy as np
 import pandas as pd
 
 from ident.captive.campaign import Campaign
-from ident.checks.findings import STATE, Body, dynamic, run_table
-from ident.identification.identify import Identification, Solver, identify
+from ident.captive.run_table import STATES, run_table
+from ident.checks.findings import Body, dynamic
+from ident.identification.identify import Identification, identify
 from ident.identification.nodes import vanishes
+from ident.identification.solver import Solver
 from ident.planning.candidates import Facility, candidate_runs, defaults
 from ident.planning.design import Array, fewest_runs
 from sim.boat.catalogue import OUTPUTS, Term
@@ -341,7 +343,7 @@ def planned_campaign(campaign: Campaign, runs: pd.DataFrame) -> Campaign:
     """
     word = min(campaign.header.quality, key=lambda k: campaign.header.quality[k].factor)
     sigma = {f"s_{o}": runs[f"s_{o}"] for o in OUTPUTS}
-    done = run_table({c: runs[c] for c in ("run_id", "test", "part", *STATE)} | sigma | dict.fromkeys(OUTPUTS, 1.0))
+    done = run_table({c: runs[c] for c in ("run_id", "test", "part", *STATES)} | sigma | dict.fromkeys(OUTPUTS, 1.0))
     done = done.assign(quality=word, file="plan.csv", decoupled="", reason="", source="planned")
     return replace(campaign, runs=pd.concat([campaign.runs, done], ignore_index=True))
 
