@@ -8,7 +8,8 @@ from importlib.util import find_spec
 import numpy as np
 import pytest
 
-from ident.validation.bands import batch_of, covariance, draw, fly_samples
+from ident.validation.bands import batch_of, covariance, fly_samples
+from ident.validation.draws import draw
 from ident.validation.cluster import over_dask
 from sim.boat.coefficients import Coefficients
 from sim.files.errors import InputError

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ident.validation.bands import Bands, covariance, draw, fly_samples, inside, variance_shares
+from ident.validation.bands import Bands, covariance, fly_samples, inside, variance_shares
+from ident.validation.draws import draw
 from sim.boat.coefficients import Coefficients
 from sim.flight.case import load_case, load_reference
 from sim.flight.simulate import simulate

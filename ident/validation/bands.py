@@ -11,8 +11,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
+from scipy.special import chdtri
 
 from ident.validation.cluster import over_dask
+from ident.validation.draws import draw, scores
 from sim.boat.coefficients import Coefficients
 from sim.boat.database import correlation_pairs
 from sim.boat.vehicle import Vehicle
@@ -29,10 +31,8 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 # Samples handed out at once: enough that handing out costs nothing, few enough for a progress bar.
 CHUNK = 8
-# Relative variance below which a direction of correlated values is rounding.
-_LEAST_VARIANCE = 1e-9
-# Standard deviations of chance that a variance share must exceed.
-_CHANCE = 3.0
+# Probability that chance alone lists a coefficient as a cause of a channel's width.
+_BY_CHANCE = 0.01
 LEVELS = {"50": (25.0, 75.0), "95": (2.5, 97.5)}
 
 
@@ -86,20 +86,6 @@ def covariance(rows: pd.DataFrame) -> tuple[pd.DataFrame, Array]:
         for other, coefficient in correlation_pairs(text).items():
             matrix[i, place[other]] = coefficient
     return known, 0.5 * (matrix + matrix.T)
-
-
-def draw(correlation: Array, samples: int, seed: int) -> Array:
-    """Correlated standard normal draws.
-
-    Returns
-    -------
-    (samples, n) in standard errors; sample i does not depend on how many are drawn.
-    """
-    values, vectors = np.linalg.eigh(correlation)
-    root = vectors * np.sqrt(np.clip(values, 0.0, None))
-    children = np.random.SeedSequence(seed).spawn(samples)
-    # One product a sample: a single large one would round by the number of samples.
-    return np.stack([root @ np.random.default_rng(child).standard_normal(len(values)) for child in children])
 
 
 def _row_steps(rows: pd.DataFrame, estimates: pd.DataFrame) -> tuple[NDArray[np.int64], Array]:
@@ -282,12 +268,36 @@ def inside(bands: Bands, case: Case, reference: Series) -> dict[str, Any]:
     return found
 
 
-def _scores(draws: Array, correlation: Array) -> Array:
-    """Independent standard scores of correlated draws of one coefficient, (samples, rank)."""
-    values, vectors = np.linalg.eigh(correlation)
-    free = values > _LEAST_VARIANCE * values[-1]
-    scores = draws @ (vectors[:, free] / np.sqrt(values[free]))
-    return np.asarray(scores - scores.mean(axis=0))
+def _summed(values: Array, axis: int) -> Array:
+    """Sums along an axis: numpy adds in one order everywhere, which a product of matrices does not."""
+    return np.asarray(np.ascontiguousarray(values).sum(axis=axis))
+
+
+def _without_each(scores: Array, spread: Array) -> tuple[float, Array]:
+    """Share of the variance of a channel that goes with the scores, of all samples and without each.
+
+    Parameters
+    ----------
+    scores : (samples, rank), mean zero. spread : (samples, records), mean zero.
+
+    Returns
+    -------
+    share : Sum of the squared correlations, averaged over the record with the variance as weight.
+    without : (samples,) the same without one sample.
+    """
+    samples = len(scores)
+    # What a sum of products about the mean loses with a sample is this times the sample's product.
+    lost = samples / (samples - 1.0)
+    own = _summed(spread**2, 1)
+    total = float(own.sum())
+    share, without = 0.0, np.zeros(samples)
+    for score in np.ascontiguousarray(scores.T):
+        along = _summed(score[:, None] * spread, 0)
+        square, size = float((along**2).sum()), float((score**2).sum())
+        share += square / size / total
+        left = square - 2.0 * lost * score * _summed(spread * along, 1) + (lost * score) ** 2 * own
+        without += left / (size - lost * score**2) / (total - lost * own)
+    return share, without
 
 
 def variance_shares(bands: Bands, channel: str, most: int = 8) -> list[dict[str, Any]]:
@@ -296,28 +306,43 @@ def variance_shares(bands: Bands, channel: str, most: int = 8) -> list[dict[str,
     The share of the variance that a linear function of all values of a coefficient
     accounts for: the squared correlations of the channel with the coefficient's independent
     scores, averaged over the record with the variance as weight, less what chance gives
-    (1/samples a score); a share within what chance scatters is left out. Coefficients whose
-    errors are correlated each have what they share, so that the shares may sum to more than one.
+    (1/samples a score). Its standard error is the jackknife's, from the shares without one sample
+    each (Efron and Stein 1981). By chance alone, the samples times the squared correlations are
+    chi-square distributed with a degree of freedom a score; a coefficient is listed when its
+    share lies beyond what, of all coefficients together, one in a hundred draws exceeds.
+    Coefficients whose errors are correlated each have what they share, so that the shares may sum
+    to more than one.
+
+    Parameters
+    ----------
+    bands, channel : Flown samples, and which channel of them.
+    most : Number of coefficients listed.
+
+    Returns
+    -------
+    ``coefficient``, ``share`` (0 to 1) and ``standard_error``, surest share (share less twice its
+    standard error) first.
     """
     values = bands.channels[channel]
     complete = np.isfinite(values).all(axis=0)
     spread = values[:, complete] - values[:, complete].mean(axis=0)
-    variance = float((spread**2).sum())
-    if variance == 0.0:
+    if len(values) < 3 or not spread.any():
         return []
-    found: dict[str, float] = {}
     names = np.array(bands.estimates)
-    for coefficient in dict.fromkeys(bands.estimates):
+    coefficients = list(dict.fromkeys(bands.estimates))
+    found = []
+    for coefficient in coefficients:
         places = np.flatnonzero(names == coefficient)
-        scores = _scores(bands.draws[:, places], bands.correlation[np.ix_(places, places)])
-        square = ((scores.T @ spread) ** 2).sum(axis=1) / (scores**2).sum(axis=0)
-        rank, samples = scores.shape[1], len(values)
-        share = float(square.sum() / variance - rank / samples)
-        # By chance, samples * square / variance is chi-square with a degree of freedom a score.
-        if share > _CHANCE * np.sqrt(2.0 * rank) / samples:
-            found[coefficient] = min(share, 1.0)
-    largest = sorted(found.items(), key=lambda item: -item[1])[:most]
-    return [{"coefficient": name, "share": share} for name, share in largest]
+        own = scores(bands.draws[:, places], bands.correlation[np.ix_(places, places)])
+        samples, rank = own.shape
+        share, without = _without_each(own - own.mean(axis=0), spread)
+        if samples * share <= chdtri(rank, _BY_CHANCE / len(coefficients)):
+            continue
+        error = np.sqrt((samples - 1.0) / samples * ((without - without.mean()) ** 2).sum())
+        one = {"share": min(share - rank / samples, 1.0), "standard_error": float(error)}
+        found.append({"coefficient": coefficient, **one})
+    found.sort(key=lambda one: 2.0 * one["standard_error"] - one["share"])
+    return found[:most]
 
 
 def summary(bands: Bands, case: Case, reference: Series) -> dict[str, Any]:
@@ -342,7 +367,7 @@ def show(found: dict[str, Any], console: Console) -> None:
         for channel, entry in channels.items():
             table.add_row(source, channel, f"{100 * entry['50']:.0f} %", f"{100 * entry['95']:.0f} %")
     console.print(table)
-    table = Table("channel", "variance share by coefficient")
+    table = Table("channel", "variance share by coefficient, ± its standard error")
     for channel, shares in found["variance_shares"].items():
-        table.add_row(channel, ", ".join(f"{s['coefficient']} {100 * s['share']:.0f} %" for s in shares))
+        table.add_row(channel, ", ".join(f"{s['coefficient']} {100 * s['share']:.0f} ± {100 * s['standard_error']:.0f} %" for s in shares))
     console.print(table)
