@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from ident.validation.bands import batch_of, covariance, fly_samples
-from ident.validation.draws import draw
 from ident.validation.cluster import over_dask
+from ident.validation.draws import draw
 from sim.boat.coefficients import Coefficients
 from sim.files.errors import InputError
 from sim.flight.case import Start, load_case

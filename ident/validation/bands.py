@@ -369,5 +369,6 @@ def show(found: dict[str, Any], console: Console) -> None:
     console.print(table)
     table = Table("channel", "variance share by coefficient, ± its standard error")
     for channel, shares in found["variance_shares"].items():
-        table.add_row(channel, ", ".join(f"{s['coefficient']} {100 * s['share']:.0f} ± {100 * s['standard_error']:.0f} %" for s in shares))
+        texts = [f"{s['coefficient']} {100 * s['share']:.0f} ± {100 * s['standard_error']:.0f} %" for s in shares]
+        table.add_row(channel, ", ".join(texts))
     console.print(table)
