@@ -117,7 +117,7 @@ def yes_no(value: bool) -> str:
 
 def errata() -> str:
     """The errata this program applies."""
-    with (ROOT / "ident" / "data" / "errata.csv").open(encoding="utf-8") as stream:
+    with (ROOT / "sim" / "vehicles" / "bb2" / "errata.csv").open(encoding="utf-8") as stream:
         rows = list(csv.DictReader(stream))
     return table(list(rows[0]), [list(r.values()) for r in rows])
 
@@ -176,7 +176,9 @@ def main() -> int:
     """Rewrite or check; returns the exit code."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--check", action="store_true", help="exit 1 when a block is not current")
-    only_check = parser.parse_args().check
+    parser.add_argument("--quick", action="store_true", help="leave what follows from a calibration as it is")
+    chosen = parser.parse_args()
+    only_check = chosen.check
     loaded = Path(ident.__file__).resolve().parents[1]
     if loaded != ROOT:
         raise SystemExit(f"ident was loaded from {loaded} before; run docs/generate.py by itself")
@@ -185,7 +187,7 @@ def main() -> int:
         fitted = fit(ROOT / "raw_captive_data", db)[0]
         coefficients = Coefficients(fitted.campaign.vehicle, fitted.rows)
         readme = {"signs": signs(coefficients)}
-        if not only_check:
+        if not (only_check or chosen.quick):
             # A calibration takes minutes, so only a full run renews what follows from it.
             calibrate("bb2", db)
             board, flown = run_all(db, None, None)

@@ -81,7 +81,8 @@ def test_other_units_give_the_same_database(tables, rows, tmp_path):
             table[column] = text(number(table[column]) / factor)
             table = table.rename(columns={column: new})
         other[name] = table
-    assert_same(rewritten(tmp_path / "c", other, header()), rows, 1e-12)
+    # Rows carry twelve digits, and a small load left by a subtraction has two fewer.
+    assert_same(rewritten(tmp_path / "c", other, header()), rows, 1e-10)
 
 
 @pytest.mark.parametrize(("x", "y", "z"), [("forward", "starboard", "down"), ("forward", "port", "up")])

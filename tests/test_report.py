@@ -62,7 +62,7 @@ def coefficients(database):
 
 @pytest.fixture(scope="module")
 def path(database, tmp_path_factory):
-    return Path(write_report(database, None, tmp_path_factory.mktemp("pages") / "new")["file"])
+    return Path(write_report(database, None, tmp_path_factory.mktemp("pages") / "new", "bb2")["file"])
 
 
 @pytest.fixture(scope="module")
@@ -176,7 +176,7 @@ def test_page_of_a_sparse_commit_without_metadata(tmp_path, database):
     rows, _ = read_rows(database, vehicle="bb2")
     db = str(tmp_path / "db")
     commit(db, rows[rows["coefficient"].isin(["KT", "X_uvw", "w_T"])], {})
-    page = Path(write_report(db, 0, tmp_path)["file"]).read_text("utf-8")
+    page = Path(write_report(db, 0, tmp_path, "bb2")["file"]).read_text("utf-8")
     assert "FAIL: wrong sign" in page
     assert page.count('class="absent"') == len(vehicle_terms(load_vehicle("bb2"))) - 3
     assert "does not name its input files" in page
@@ -184,7 +184,7 @@ def test_page_of_a_sparse_commit_without_metadata(tmp_path, database):
 
 def test_wrong_requests_are_refused(tmp_path, database):
     with pytest.raises(InputError, match="version 7"):
-        write_report(database, 7, tmp_path)
+        write_report(database, 7, tmp_path, "bb2")
     with pytest.raises(InputError):
         write_report(database, None, tmp_path, vehicle="nobody")
 
@@ -195,7 +195,7 @@ def test_page_that_cannot_be_written(tmp_path, database):
     commit(db, rows[rows["coefficient"] == "KT"], {})
     (tmp_path / "file").write_text("")
     with pytest.raises(InputError, match="cannot be written"):
-        write_report(db, None, tmp_path / "file")
+        write_report(db, None, tmp_path / "file", "bb2")
 
 
 def test_quality_colours_tell_words_apart():

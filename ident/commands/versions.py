@@ -12,23 +12,29 @@ from ident.commands.shared import DB, FOLDER, OUT, VERSION, console_for, emit, j
 @click.command()
 @DB
 @VERSION
-@click.option("--vehicle", default="bb2", show_default=True, help="Bundled vehicle name, or path to a vehicle file.")
+@click.option(
+    "--vehicle", default=None, help="Bundled vehicle or path to a vehicle file; all of the version's without it."
+)
 @OUT
 @json_to("Write what the page shows as JSON.")
-def report(db: str, version: int | None, vehicle: str, out: Path, json_path: str | None) -> None:
-    """Write one self-contained HTML page on a database version.
+def report(db: str, version: int | None, vehicle: str | None, out: Path, json_path: str | None) -> None:
+    """Write one self-contained HTML page on each vehicle of a database version.
+
+    With --json, one object for one vehicle, a list for several.
 
     \b
     Example: ident report --version 0
     """
-    from ident.report.page import write_report
+    from ident.report.page import reported_vehicles, write_report
 
     console = console_for(quiet=json_path == "-")
-    with console.status("drawing every coefficient"):
-        done = write_report(db, version, out, vehicle)
-    console.print(f"report: {done['file']}", highlight=False)
+    done = []
+    for name in [vehicle] if vehicle else reported_vehicles(db, version):
+        with console.status(f"drawing every coefficient of {name}"):
+            done.append(write_report(db, version, out, name))
+        console.print(f"report: {done[-1]['file']}", highlight=False)
     if json_path:
-        emit(done, json_path)
+        emit(done[0] if len(done) == 1 else done, json_path)
 
 
 @click.command()

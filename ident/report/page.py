@@ -23,7 +23,8 @@ from sim.boat.catalogue import RULES, Term
 from sim.boat.coefficients import Coefficients
 from sim.boat.database import Version, axis_columns, own_version, read_rows
 from sim.boat.parts import parts_of, vehicle_terms
-from sim.boat.vehicle import Vehicle, load_vehicle
+from sim.boat.vehicle import Vehicle, bundled, load_vehicle
+from sim.files.errors import InputError
 from sim.files.frames import PROGRAM
 from sim.kernel.assemble import Environment
 
@@ -181,9 +182,27 @@ def _calibration(commit: Version, vehicle: Vehicle, number: int) -> dict[str, An
     return found | {"groups": groups, "figure": prior_and_posterior(found, stamp)}
 
 
-def _errata() -> list[dict[str, str]]:
-    with (files("ident") / "data" / "errata.csv").open(encoding="utf-8") as stream:
-        return list(csv.DictReader(stream))
+_ERRATA = ("equation", "printed", "corrected", "consequence")
+
+
+def _errata(vehicle: Vehicle) -> list[dict[str, str]]:
+    """What is printed wrong in the vehicle's source; none where its file names no table.
+
+    Raises
+    ------
+    InputError
+        When the table cannot be read or has other columns.
+    """
+    if vehicle.errata is None:
+        return []
+    try:
+        with open(vehicle.errata, encoding="utf-8", newline="") as stream:
+            table = csv.DictReader(stream)
+            if tuple(table.fieldnames or ()) != _ERRATA:
+                raise InputError(f"{vehicle.errata}, row 1", ", ".join(table.fieldnames or ()), ", ".join(_ERRATA))
+            return list(table)
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise InputError(vehicle.errata, f"cannot be read: {error}", "a CSV file in UTF-8") from error
 
 
 def _content(db: str, number: int, vehicle: Vehicle, rows: pd.DataFrame, commit: Version) -> dict[str, Any]:
@@ -214,7 +233,7 @@ def _content(db: str, number: int, vehicle: Vehicle, rows: pd.DataFrame, commit:
         "calibration": _calibration(commit, vehicle, number),
         "vocabulary": vocabulary,
         "colours": colours,
-        "errata": _errata(),
+        "errata": _errata(vehicle),
     }
 
 
@@ -225,7 +244,22 @@ def _severities(findings: list[dict[str, Any]] | None) -> dict[str, int] | None:
     return {s: sum(f.get("severity") == s for f in findings) for s in reversed(SEVERITIES)}
 
 
-def write_report(db: str, version: int | None, out: Path, vehicle: str = "bb2") -> dict[str, Any]:
+def reported_vehicles(db: str, version: int | None) -> list[str]:
+    """Bundled vehicles of a version, for which a page can be written without a vehicle file.
+
+    Raises
+    ------
+    InputError
+        When database or version do not exist, or every vehicle needs its file.
+    """
+    names = sorted(read_rows(db, version)[0]["vehicle"].unique())
+    known = [name for name in names if name in bundled("vehicles")]
+    if not known:
+        raise InputError(db, f"coefficients of {', '.join(names)}", "--vehicle FILE, the vehicle file of one of them")
+    return known
+
+
+def write_report(db: str, version: int | None, out: Path, vehicle: str) -> dict[str, Any]:
     """Write the report of one vehicle at one database version.
 
     Parameters

@@ -156,7 +156,9 @@ class Axes(FrameData):
 class Vehicle(Data):
     """A vehicle file, turned to the program frame by ``load_vehicle``.
 
-    ``geometry`` names its surface (``sim.hull.surface``), relative to the vehicle file; waves need it.
+    ``geometry`` names its surface (``sim.hull.surface``), waves need it; ``errata`` a table of what is
+    printed wrong in its source and how it is applied (columns equation, printed, corrected,
+    consequence), shown in the report. Both are relative to the vehicle file.
     """
 
     name: str
@@ -171,6 +173,7 @@ class Vehicle(Data):
     sections: Sections | None = None
     tanks: Tanks | None = None
     geometry: str | None = None
+    errata: str | None = None
 
     @field_validator("planes")
     @classmethod
@@ -249,7 +252,7 @@ def read_toml(name: str | Path, kind: str, named_in: str = "") -> tuple[dict[str
         raise InputError(str(path), f"not TOML: {error}", "a TOML file in UTF-8") from error
 
 
-def load_vehicle(name: str | Path = "bb2", beside: str | Path = "") -> Vehicle:
+def load_vehicle(name: str | Path, beside: str | Path = "") -> Vehicle:
     """Read a vehicle and turn it to the program frame.
 
     Parameters
@@ -267,7 +270,8 @@ def load_vehicle(name: str | Path = "bb2", beside: str | Path = "") -> Vehicle:
     data, where = read_toml(there, "vehicles", f"{beside}, key vehicle" if str(beside) else "")
     vehicle = checked(Vehicle, data, where)
     vehicle.frame.declared(where)
-    if vehicle.geometry is not None:
-        folder = Path(where).parent if Path(where).suffix == ".toml" else Path(str(files("sim") / "vehicles"))
-        vehicle.geometry = str(folder / vehicle.geometry)
+    folder = Path(where).parent if Path(where).suffix == ".toml" else Path(str(files("sim") / "vehicles"))
+    for key in ("geometry", "errata"):
+        if getattr(vehicle, key) is not None:
+            setattr(vehicle, key, str(folder / getattr(vehicle, key)))
     return vehicle.turned(PROGRAM)

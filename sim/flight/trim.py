@@ -101,16 +101,24 @@ def _solve(
     left = float(np.abs(residual(found.x)).max())
     wrong = ""
     if not np.isfinite(left) or left > 1e-8:
-        angles = ", ".join(f"{a:.1f}" for a in np.degrees(controls[: mixer.shape[0]]))
         wrong = (
-            f"no self-propulsion state at {speed:.4g} m/s and D0 = {depth:.4g} m; closest found: planes {angles} deg, "
-            f"pitch {np.degrees(state[10]):.1f} deg, n {controls[mixer.shape[0]]:.3g} 1/s"
+            f"no self-propulsion state at {speed:.4g} m/s and D0 = {depth:.4g} m; {_closest(state, controls, mixer)}"
         )
     # The path is straight: heading such that the course is along earth x.
     kernel.rhs(weighted(found.x), state, controls, work, derivative)
     state[11] = -np.arctan2(derivative[7], derivative[6])
     lateral = float(found.x[3]) if upright else 0.0
     return Trim(state, controls, level["dV"], float(found.x[5]), left, lateral=lateral), wrong
+
+
+def _closest(state: Array, controls: Array, mixer: Array) -> str:
+    """What a search that failed came to, where that is a state of a boat at all."""
+    angles = np.degrees(controls[: mixer.shape[0]])
+    pitch, revolutions = float(np.degrees(state[10])), float(controls[mixer.shape[0]])
+    if not np.isfinite([*angles, pitch, revolutions]).all() or max(np.abs(angles).max(initial=0.0), abs(pitch)) > 90.0:
+        return "the search leaves all upright attitudes: planes, thrust and weight do not balance there"
+    shown = ", ".join(f"{a:.1f}" for a in angles)
+    return f"closest state: planes {shown} deg, pitch {pitch:.1f} deg, n {revolutions:.3g} 1/s"
 
 
 def self_propulsion(

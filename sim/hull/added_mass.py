@@ -152,7 +152,7 @@ def depth_table(
 
 
 @click.command()
-@click.option("--vehicle", "name", default="bb2", show_default=True, help="Bundled name or vehicle file.")
+@click.option("--vehicle", "name", required=True, help="Bundled name or vehicle file.")
 @click.option("--depth", "depths", multiple=True, type=float, default=(2.5, 25.0), show_default=True, help="D0 [m].")
 @click.option("--omega", "omegas", multiple=True, type=float, default=(0.0, np.inf), show_default=True, help="[rad/s].")
 @click.option("--coarser", default=2.0, show_default=True, help="Panel size over that of the geometry file.")
