@@ -7,13 +7,13 @@ has no list of its own. A version is one commit of a Delta Lake table.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass
-from pathlib import Path
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from sim.boat import catalogue
+from sim.boat import catalogue, row_codec
+from sim.boat.delta_log import OURS, WHOLE, Log, Version
 from sim.files.errors import InputError
+from sim.files.storage import engine
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -37,8 +37,6 @@ COLUMNS = {
     "equation": "equations of the source",
     "runs": "run ids behind the value",
 }
-# How often a history that a commit overtook is read again.
-_LOOKS = 5
 NUMBERS = ("value", "stderr", "worst_residual")
 COUNTS = ("n_runs", "estimate")
 
@@ -58,11 +56,6 @@ def to_column(column: str, value: float) -> float:
     return float(f"{math.degrees(value):.10g}") if column.endswith("_deg") else value
 
 
-def correlation_pairs(text: str) -> dict[int, float]:
-    """The ``correlation`` cell: estimate number -> correlation coefficient."""
-    return {int(k): float(v) for k, v in (item.split(":") for item in text.split())}
-
-
 def column_order() -> list[str]:
     """All columns in the order they are stored."""
     first = ["vehicle", "coefficient", "part", "output"]
@@ -74,28 +67,14 @@ def version_words(database: Mapping[str, Any]) -> str:
     return f"database version {database['version']} ({database['digest'][:16]})"
 
 
-@dataclass(frozen=True)
-class Version:
-    """One commit of the database."""
-
-    number: int
-    timestamp: str
-    metadata: dict[str, str]
-
-    @property
-    def digest(self) -> str:
-        """Content digest of the version's rows."""
-        return self.metadata.get("digest", "")
-
-
-def brief(error: Exception) -> str:
-    """What the storage engine says, in one line and without its own trace."""
-    lines = str(error).split("   0: ")[0].splitlines()
-    return " ".join(line.strip(" \t↳") for line in lines if line.strip())[:300]
-
-
-def open_table(path: str, version: int | None = None) -> Any:
+def open_table(path: str, version: int | None = None, log: Log | None = None) -> Any:
     """The Delta table at ``path``, at a version.
+
+    Parameters
+    ----------
+    path : Folder or object-store URL of the database.
+    version : Version number, latest when None.
+    log : Its log, when it has been read already.
 
     Raises
     ------
@@ -103,28 +82,70 @@ def open_table(path: str, version: int | None = None) -> Any:
         When there is no database there, or no such version.
     """
     from deltalake import DeltaTable
-    from deltalake.exceptions import DeltaError, TableNotFoundError
 
-    local = Path(path)
-    if "://" not in path and not (local / "_delta_log").is_dir():
-        found = "a file" if local.is_file() else "no coefficient database"
-        raise InputError(path, found, "a database written by `ident fit`; choose it with --db")
-    try:
-        table = DeltaTable(path)
-    except (TableNotFoundError, DeltaError, OSError) as error:
-        raise InputError(
-            path, f"not a coefficient database: {brief(error)}", "a database written by `ident fit`"
-        ) from error
-    latest = table.version()
-    if version is not None:
-        if not 0 <= version <= latest:
-            raise InputError(path, f"version {version} does not exist", f"0 to {latest}; see `ident versions`")
-        table.load_as_version(version)
+    log = log or Log(path)
+    number = log.last if version is None else version
+    if not 0 <= number <= log.last:
+        raise InputError(path, f"version {number} does not exist", f"0 to {log.last}; see `ident versions`")
+    if number < log.first:
+        text = f"version {number} is gone: the log begins at version {log.first}"
+        raise InputError(path, text, f"{log.first} to {log.last}; see `ident versions`")
+    with engine(path, "not a coefficient database", OURS, quiet=True):
+        table = DeltaTable(path, version=number)
+        stored = {f.name: str(f.type) for f in _schema(table)}
+    check_columns(path, stored)
     return table
 
 
+def _schema(table: Any) -> Any:
+    import pyarrow as pa
+
+    return pa.schema(table.schema().to_arrow())
+
+
+def check_columns(path: str, stored: Mapping[str, str]) -> None:
+    """Refuse a table whose columns are not those of a coefficient database.
+
+    Parameters
+    ----------
+    path : Where the table is.
+    stored : Column -> type, as pyarrow names it. Axes may be missing: they came later.
+
+    Raises
+    ------
+    InputError
+        For columns that are missing, unknown or of another type.
+    """
+    missing = [c for c in COLUMNS if c not in stored]
+    if missing:
+        raise InputError(path, f"not a coefficient database: no column {', '.join(missing)}", OURS)
+    unknown = [c for c in stored if c not in column_order()]
+    if unknown:
+        text = f"columns that this program does not know: {', '.join(map(repr, unknown))}"
+        raise InputError(path, text, f"{OURS} of this release or an earlier one")
+    for column, kind in stored.items():
+        if kind != column_type(column):
+            raise InputError(path, f"column {column} holds {kind}", column_type(column))
+
+
+def column_type(column: str) -> str:
+    """Type of a column, as pyarrow names it."""
+    return "double" if column in NUMBERS or column in axis_columns() else "int64" if column in COUNTS else "string"
+
+
+def digest(rows: pd.DataFrame, columns: Sequence[str] | None = None) -> str:
+    """SHA-256 of the content of database rows, independent of their order.
+
+    Parameters
+    ----------
+    rows : Rows of one vehicle.
+    columns : Columns that count, in order; those of this program when None.
+    """
+    return row_codec.digest(rows, column_order() if columns is None else columns)
+
+
 def read_rows(path: str, version: int | None = None, vehicle: str | None = None) -> tuple[pd.DataFrame, int]:
-    """Rows of one version and its number.
+    """Rows of one version and its number, each vehicle's checked against the digest of its commit.
 
     Parameters
     ----------
@@ -135,42 +156,66 @@ def read_rows(path: str, version: int | None = None, vehicle: str | None = None)
     Raises
     ------
     InputError
-        When database, version or vehicle do not exist.
+        When database, version or vehicle do not exist, or the rows are not those that were committed.
     """
-    from deltalake.exceptions import DeltaError
-
-    table = open_table(path, version)
-    # A version written before an axis existed has no column for it.
-    try:
-        rows = table.to_pyarrow_table().to_pandas().reindex(columns=column_order())
-    except (OSError, DeltaError) as error:
-        raise InputError(
-            path, f"version {table.version()} cannot be read: {brief(error)}", "all files of the version"
-        ) from error
-    if vehicle is not None:
-        known = sorted(rows["vehicle"].unique())
-        rows = rows[rows["vehicle"] == vehicle]
-        if rows.empty:
-            raise InputError(path, f"no coefficients of vehicle {vehicle!r}", ", ".join(known))
+    log = Log(path)
+    number = log.last if version is None else version
+    everything = stored_rows(log, number)
+    expected, complete = log.contents(number)
+    known = sorted(everything["vehicle"].dropna().unique())
+    if vehicle is not None and vehicle not in {*known, *expected}:
+        raise InputError(path, f"no coefficients of vehicle {vehicle!r}", ", ".join(known))
+    names = {*known, *(v for v in expected if v)} if vehicle is None else {vehicle}
+    for name in sorted(names):
+        _check(log, number, name, everything, expected, complete)
+    rows = everything if vehicle is None else everything[everything["vehicle"] == vehicle]
     order = ["vehicle", "coefficient", "part", *axis_columns()]
-    return rows.sort_values(order, kind="stable").reset_index(drop=True), int(table.version())
+    return rows.sort_values(order, kind="stable").reset_index(drop=True), number
+
+
+def stored_rows(log: Log, number: int) -> pd.DataFrame:
+    """Rows of one version as they are stored, not checked. Raises ``InputError`` when they cannot be read."""
+    table = open_table(log.path, number, log)
+    with engine(f"{log.path}, version {number}", "cannot be read", WHOLE, quiet=True):
+        read = table.to_pyarrow_table()
+    # A version written before an axis existed has no column for it.
+    rows = read.to_pandas().reindex(columns=column_order())
+    if rows["vehicle"].isna().any():
+        raise InputError(f"{log.path}, version {number}", "rows without a vehicle", WHOLE)
+    return rows
+
+
+def _check(
+    log: Log, number: int, vehicle: str, everything: pd.DataFrame, expected: dict[str, str], complete: bool
+) -> None:
+    """Refuse rows of a vehicle that are not those its commit wrote."""
+    wanted = expected.get(vehicle, expected.get("", ""))
+    where = f"{log.path}, version {number}"
+    if not wanted:
+        text = f"rows of {vehicle!r} that no commit of `ident fit` vouches for"
+        raise InputError(where, text if complete else f"{text}: the log begins at version {log.first}", WHOLE)
+    rows = everything[everything["vehicle"] == vehicle]
+    if not any(digest(rows, columns) == wanted for columns in _columns_of_the_time(log, number)):
+        raise InputError(where, f"rows of {vehicle!r} are not those that were committed ({wanted[:16]})", WHOLE)
+
+
+def _columns_of_the_time(log: Log, number: int) -> Iterator[list[str]]:
+    """The columns a digest may be of: those of this program, and those the table had before axes were added."""
+    order = column_order()
+    yield order
+    seen = {tuple(order)}
+    for k in range(number, log.first - 1, -1):
+        columns = tuple(c for c in order if c in log.entry(k).columns)
+        if columns and columns not in seen:
+            seen.add(columns)
+            yield list(columns)
 
 
 def versions(path: str) -> list[Version]:
-    """Every version of a database, oldest first. Raises ``InputError`` when there is none."""
-    entries: list[dict[str, Any]] = []
-    for _ in range(_LOOKS):
-        table = open_table(path)
-        entries = table.history()
-        # A commit between the two calls shifts the numbers of the history.
-        if entries and max(int(e["version"]) for e in entries) == table.version() >= 0:
-            break
-    found = []
-    for entry in entries:
-        metadata = {k: str(v) for k, v in entry.items() if k not in ("version", "timestamp")}
-        stamp = entry.get("timestamp", "")
-        found.append(Version(int(entry["version"]), str(stamp), metadata))
-    return sorted(found, key=lambda v: v.number)
+    """Every version of a database, oldest first. Raises ``InputError`` when there is none, or it is damaged."""
+    log = Log(path)
+    open_table(path, log.last, log)
+    return log.versions
 
 
 def find_version(path: str, number: int | None = None) -> Version:
@@ -181,8 +226,9 @@ def find_version(path: str, number: int | None = None) -> Version:
     InputError
         When there is no database there, or no such version.
     """
-    number = int(open_table(path, number).version())
-    return next(v for v in versions(path) if v.number == number)
+    log = Log(path)
+    open_table(path, number, log)
+    return log.entry(log.last if number is None else number).version
 
 
 def own_version(path: str, vehicle: str, number: int) -> Version:
@@ -199,13 +245,14 @@ def own_version(path: str, vehicle: str, number: int) -> Version:
     InputError
         When there is no such version.
     """
-    open_table(path, number)
-    history = versions(path)
-    up_to = [v for v in history if v.number <= number]
-    return last_own(history, vehicle, number) or (up_to or [Version(number, "", {})])[-1]
+    log = Log(path)
+    open_table(path, number, log)
+    return last_own(log.versions, vehicle, number) or log.entry(number).version
 
 
 def last_own(history: list[Version], vehicle: str, number: int) -> Version | None:
     """The last commit of a vehicle's rows up to version ``number``, of a history oldest first."""
-    own = [v for v in history if v.number <= number and v.metadata.get("vehicle", vehicle) == vehicle]
+    own = [
+        v for v in history if v.number <= number and v.digest and v.metadata.get("vehicle", vehicle) == vehicle
+    ]
     return own[-1] if own else None

@@ -1,0 +1,182 @@
+"""Files of a database where they lie: in a folder, or under the URL of an object store."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import sys
+import tempfile
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from sim.files.errors import InputError
+
+# The storage engine writes its own trace to the error stream of the process when it fails.
+_STREAM = threading.Lock()
+
+
+def is_url(path: str) -> bool:
+    """Whether a database lies in an object store."""
+    return "://" in path
+
+
+def brief(error: BaseException) -> str:
+    """What the storage engine says, in one line and without its own trace."""
+    lines = str(error).split("   0: ")[0].splitlines()
+    return " ".join(line.strip(" \t↳") for line in lines if line.strip())[:300]
+
+
+@contextlib.contextmanager
+def _own_stream() -> Iterator[None]:
+    """Keeps what native code writes to the error stream of the process, and shows it when nothing failed."""
+    with _STREAM:
+        try:
+            sys.stderr.flush()
+            kept = os.dup(2)
+        except (OSError, ValueError, AttributeError):
+            # No error stream at all.
+            yield
+            return
+        with tempfile.TemporaryFile() as said:
+            os.dup2(said.fileno(), 2)
+            try:
+                yield
+            finally:
+                os.dup2(kept, 2)
+                os.close(kept)
+
+
+@contextlib.contextmanager
+def engine(where: str, doing: str, allowed: str, quiet: bool = False) -> Iterator[None]:
+    """Calls of the storage engine: whatever it throws becomes one message.
+
+    Parameters
+    ----------
+    where, doing, allowed : Of the ``InputError``; ``doing`` is followed by what the engine says.
+    quiet : Also keep native code from writing to the error stream.
+
+    Raises
+    ------
+    InputError
+        For every failure of the engine, a panic of its native code among them.
+    """
+    from deltalake.exceptions import DeltaError
+    from pyarrow import ArrowException
+
+    try:
+        with _own_stream() if quiet else contextlib.nullcontext():
+            yield
+    except InputError:
+        raise
+    except (DeltaError, ArrowException, OSError, ValueError, KeyError, TypeError, MemoryError) as error:
+        raise InputError(where, f"{doing}: {brief(error)}", allowed) from error
+    except BaseException as error:
+        # A panic of native code is no ``Exception``.
+        if type(error).__name__ != "PanicException":
+            raise
+        raise InputError(where, f"{doing}: {brief(error)}", allowed) from error
+
+
+class Storage:
+    """The files below a folder or URL.
+
+    Parameters
+    ----------
+    path : Folder, or URL of an object store (its options are taken from the environment).
+    """
+
+    def __init__(self, path: str) -> None:
+        self.path = path
+        self._remote: Any = None
+        if is_url(path):
+            from deltalake.fs import DeltaStorageHandler
+            from pyarrow.fs import PyFileSystem
+
+            with engine(path, "cannot be reached", "an object store the storage engine knows"):
+                self._remote = PyFileSystem(DeltaStorageHandler(path))
+
+    @property
+    def local(self) -> Path | None:
+        """The folder, None for an object store."""
+        return None if self._remote else Path(self.path)
+
+    def sizes(self, folder: str = "") -> dict[str, int]:
+        """Name and size [bytes] of every file in a folder; empty when there is none.
+
+        Raises
+        ------
+        InputError
+            When the folder cannot be read.
+        """
+        with engine(self.path, "cannot be read", "a database you may read"):
+            if self._remote is None:
+                where = Path(self.path) / folder
+                if not where.is_dir():
+                    return {}
+                found = {}
+                for item in os.scandir(where):
+                    with contextlib.suppress(FileNotFoundError):
+                        if item.is_file():
+                            found[item.name] = item.stat().st_size
+                return found
+            from pyarrow.fs import FileSelector, FileType
+
+            selector = FileSelector(folder or "/", allow_not_found=True, recursive=False)
+            return {
+                Path(info.path).name: info.size or 0
+                for info in self._remote.get_file_info(selector)
+                if info.type == FileType.File
+            }
+
+    def read(self, name: str) -> bytes | None:
+        """Content of a file; None when it is not there. Raises ``InputError`` when it cannot be read."""
+        with engine(f"{self.path}/{name}", "cannot be read", "a file you may read"):
+            if self._remote is None:
+                try:
+                    return (Path(self.path) / name).read_bytes()
+                except FileNotFoundError:
+                    return None
+            try:
+                with self._remote.open_input_file(name) as file:
+                    return bytes(file.read())
+            except FileNotFoundError:
+                return None
+
+    def write(self, name: str, content: bytes) -> None:
+        """Write a file whole or not at all. Raises ``InputError`` when it cannot be written."""
+        with engine(f"{self.path}/{name}", "cannot be written", "a path you may write to"):
+            if self._remote is None:
+                target = Path(self.path) / name
+                part = target.with_name(f"{target.name}.{os.getpid()}.part")
+                try:
+                    part.write_bytes(content)
+                    flush(part)
+                    part.replace(target)
+                finally:
+                    part.unlink(missing_ok=True)
+                flush(target.parent)
+            else:
+                with self._remote.open_output_stream(name) as file:
+                    file.write(content)
+
+    def remove(self, name: str) -> None:
+        """Remove a file that is there. Raises ``InputError`` when it cannot be removed."""
+        with engine(f"{self.path}/{name}", "cannot be removed", "a file you may remove"):
+            if self._remote is None:
+                (Path(self.path) / name).unlink(missing_ok=True)
+            else:
+                self._remote.delete_file(name)
+
+
+def flush(path: Path) -> None:
+    """Hand a file or folder over to the disk; returns when it is there."""
+    # Folders cannot be opened on Windows, which flushes their entries with the file.
+    if path.is_dir() and not hasattr(os, "O_DIRECTORY"):
+        return
+    handle = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
