@@ -3,9 +3,14 @@
 from __future__ import annotations
 
 import contextlib
+import glob
 import os
+import platform
 from collections.abc import Iterator
 from pathlib import Path
+
+# Folders may be shared with other machines, whose processes this one does not see.
+_HOST = platform.node().replace("/", "_")
 
 
 def check_folder(path: Path) -> None:
@@ -32,6 +37,28 @@ def check_file(path: Path) -> None:
         raise InputError(str(path), "a file that may not be written to", "a file you may write to")
 
 
+def _remove_left(path: Path) -> None:
+    """Remove what commands that were killed left of ``path``: their process is gone from this machine."""
+    for left in path.parent.glob(glob.escape(f".{path.stem}.{_HOST}.") + "*" + glob.escape(path.suffix)):
+        number = left.name[len(f".{path.stem}.{_HOST}.") : len(left.name) - len(path.suffix)]
+        if number.isdecimal() and not is_alive(int(number)):
+            with contextlib.suppress(OSError):
+                left.unlink()
+
+
+def is_alive(process: int) -> bool:
+    """Whether a process of this machine runs; where that cannot be asked, it is taken to."""
+    if os.name != "posix":
+        return True
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    except (OSError, OverflowError):
+        return True
+    return True
+
+
 @contextlib.contextmanager
 def whole(path: Path) -> Iterator[Path]:
     """A file beside ``path``, of the same suffix, that takes its place once it is written.
@@ -43,9 +70,10 @@ def whole(path: Path) -> Iterator[Path]:
     """
     from sim.files.errors import InputError
 
-    part = path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")
+    part = path.with_name(f".{path.stem}.{_HOST}.{os.getpid()}{path.suffix}")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
+        _remove_left(path)
         yield part
         part.replace(path)
     except OSError as error:

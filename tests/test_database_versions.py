@@ -15,7 +15,8 @@ import pytest
 
 from ident import __version__
 from ident.database.store import _commit, commit, digest
-from sim.boat.database import column_order, correlation_pairs, read_rows, versions
+from sim.boat.database import column_order, read_rows, versions
+from sim.boat.row_codec import correlation_pairs
 from sim.files.errors import InputError
 
 
@@ -165,7 +166,7 @@ def test_commit_returns_its_own_version_when_another_follows_at_once(few, db, mo
 LOOP = """
 import sys
 from ident.database.store import commit
-from sim.boat.database import correlation_pairs, read_rows
+from sim.boat.database import read_rows
 path = sys.argv[1]
 rows, _ = read_rows(path)
 print("ready", flush=True)
@@ -177,7 +178,7 @@ for k in range(10_000):
 ROUNDS = """
 import sys
 from ident.database.store import commit
-from sim.boat.database import correlation_pairs, read_rows
+from sim.boat.database import read_rows
 from sim.files.errors import InputError
 source, mine = sys.argv[1], float(sys.argv[2])
 rows, _ = read_rows(source)

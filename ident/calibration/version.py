@@ -13,9 +13,10 @@ from numpy.typing import NDArray
 
 from ident.calibration.estimate import Channel, Estimate, Problem, calibrate, contradictions, problem
 from ident.calibration.file import Parameter, apply, load_calibration, parameters
-from ident.database.store import commit, correlation_texts, digest
-from ident.validation.bands import covariance
+from ident.database.lock import WAIT
+from ident.database.store import commit, digest
 from sim.boat.database import NUMBERS, Version, column_order, own_version, read_rows, versions
+from sim.boat.row_codec import correlation_matrix, correlation_texts
 from sim.boat.vehicle import load_vehicle
 from sim.files.errors import InputError
 
@@ -178,7 +179,7 @@ def calibrated_rows(rows: pd.DataFrame, chosen: list[Parameter], estimate: Estim
     """
     out = rows.copy()
     out["value"] = apply(rows["value"].to_numpy(), chosen, estimate.theta)
-    first, matrix = covariance(rows)
+    first, matrix = correlation_matrix(rows)
     value, error = first["value"].to_numpy(), first["stderr"].to_numpy()
     place = first["estimate"].to_numpy()
     first_row = {int(e): i for i, e in reversed(list(enumerate(rows["estimate"])))}
@@ -190,13 +191,12 @@ def calibrated_rows(rows: pd.DataFrame, chosen: list[Parameter], estimate: Estim
     slope = np.where(multiplies, (value * factor)[:, None] / estimate.theta, side[:, None]) * inside
     total = np.outer(factor * error, factor * error) * matrix + slope @ estimate.covariance @ slope.T
     deviation = np.sqrt(np.diag(total))
-    text = correlation_texts(total, deviation)
+    text = correlation_texts(total, place.tolist())
     index = {int(e): i for i, e in enumerate(place)}
     known = rows["estimate"].to_numpy() >= 0
     where = np.array([index.get(int(e), -1) for e in rows["estimate"]])
     out.loc[known, "stderr"] = deviation[where[known]]
-    named = {i: " ".join(f"{place[int(a)]}:{b}" for a, b in (t.split(":") for t in x.split())) for i, x in text.items()}
-    out["correlation"] = [named.get(int(i), "") if i >= 0 else "" for i in where]
+    out["correlation"] = [text.get(int(e), "") for e in rows["estimate"]]
     out["calibration"] = [
         " ".join(f"{p.group.name}={x:.4g}" for p, x in zip(chosen, estimate.theta, strict=True) if p.rows[i])
         for i in range(len(rows))
@@ -223,6 +223,7 @@ def run(
     left_out: bool = True,
     workers: int | None = None,
     each: Callable[[str], None] = lambda text: None,
+    wait: float = WAIT,
 ) -> Calibrated:
     """Calibrate a captive version and commit the result.
 
@@ -234,6 +235,7 @@ def run(
     left_out : Also calibrate without each source in turn.
     workers : Threads; the result does not depend on it.
     each : Called with a line of text as the work goes on.
+    wait : How long to wait for other writers of the database [s].
 
     Raises
     ------
@@ -288,7 +290,7 @@ def run(
         "calibration": json.dumps(summary),
         "message": message,
     }
-    number, new = commit(db, done, metadata)
+    number, new = commit(db, done, metadata, wait)
     return Calibrated(summary, number, new, digest(done))
 
 

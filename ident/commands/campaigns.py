@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from ident.commands.shared import DB, OUT, console_for, emit, json_to, out_file
+from ident.commands.shared import DB, OUT, WAIT, console_for, emit, json_to, out_file
 
 
 @click.command()
@@ -17,7 +17,8 @@ from ident.commands.shared import DB, OUT, console_for, emit, json_to, out_file
 @click.option("-m", "--message", default="", help="Message stored with the version.")
 @json_to("Write the summary as JSON.")
 @click.option("--strict", is_flag=True, help="Commit nothing when a quality check finds an error.")
-def fit(folder: Path, db: str, message: str, json_path: str | None, strict: bool) -> None:
+@WAIT
+def fit(folder: Path, db: str, message: str, json_path: str | None, strict: bool, wait: float) -> None:
     """Identify the coefficients of a campaign and commit one database version.
 
     FOLDER holds campaign.toml and one CSV a test, or such folders.
@@ -30,7 +31,7 @@ def fit(folder: Path, db: str, message: str, json_path: str | None, strict: bool
 
     console = console_for(quiet=json_path == "-")
     with console.status("reading, checking and identifying"):
-        done = run(folder, db, message, strict)
+        done = run(folder, db, message, strict, wait)
     for one in done:
         show(one, console)
     if json_path:

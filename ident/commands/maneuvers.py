@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from ident.commands.shared import DB, OUT, VERSION, console_for, emit, equilibrium_of, json_to
+from ident.commands.shared import DB, OUT, VERSION, WAIT, console_for, emit, equilibrium_of, json_to
 
 
 @click.command()
@@ -144,7 +144,10 @@ def _all(db: str, version: int | None, cases: Path | None, console: Any) -> tupl
 @click.option("-m", "--message", default="", help="Message stored with the version.")
 @click.option("--left-out/--no-left-out", default=True, show_default=True, help="Repeat without each source in turn.")
 @json_to("Write priors, posteriors and diagnostics.")
-def calibrate(name: str, db: str, version: int | None, message: str, left_out: bool, json_path: str | None) -> None:
+@WAIT
+def calibrate(
+    name: str, db: str, version: int | None, message: str, left_out: bool, json_path: str | None, wait: float
+) -> None:
     """Estimate multipliers of coefficient groups from free-running maneuvers.
 
     NAME is a bundled calibration or a path to a file. Commits a new version whose parent is the
@@ -158,7 +161,7 @@ def calibrate(name: str, db: str, version: int | None, message: str, left_out: b
 
     console = console_for(quiet=json_path == "-")
     with console.status("calibrating") as status:
-        done = run(name, db, version, message, left_out, each=status.update)
+        done = run(name, db, version, message, left_out, each=status.update, wait=wait)
     show(done, console)
     if json_path:
         emit({**done.summary, "version": done.version, "new": done.new, "digest": done.digest}, json_path)

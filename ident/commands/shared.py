@@ -12,6 +12,13 @@ from typing import Any
 import click
 
 DB = click.option("--db", default="coeff_db", show_default=True, help="Database folder or object-store URL.")
+WAIT = click.option(
+    "--wait",
+    type=click.FloatRange(min=0),
+    default=60.0,
+    show_default=True,
+    help="Seconds to wait for another writer of the database.",
+)
 VERSION = click.option("--version", "version", type=int, default=None, help="Database version; latest by default.")
 
 

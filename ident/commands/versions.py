@@ -1,4 +1,4 @@
-"""Commands on the versions of a database: report, versions, diff, export."""
+"""Commands on the versions of a database: report, versions, diff, export, vacuum."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from ident.commands.shared import DB, FOLDER, OUT, VERSION, console_for, emit, json_to
+from ident.commands.shared import DB, FOLDER, OUT, VERSION, WAIT, console_for, emit, json_to
 
 
 @click.command()
@@ -53,14 +53,13 @@ def versions(db: str, json_path: str | None) -> None:
     from sim.boat.database import versions as read
 
     keys = ("vehicle", "campaign", "digest", "parent", "program", "message")
-    found = [
-        {
-            "version": v.number,
-            "time": datetime.fromtimestamp(int(v.timestamp) / 1000, UTC).isoformat(timespec="seconds"),
-            **{k: v.metadata.get(k, "") for k in keys},
-        }
-        for v in read(db)
-    ]
+    found = []
+    for v in read(db):
+        when = datetime.fromtimestamp(int(v.timestamp) / 1000, UTC).isoformat(timespec="seconds")
+        said = {k: v.metadata.get(k, "") for k in keys}
+        if v.operation:
+            said["message"] = f"{v.operation} by another program"
+        found.append({"version": v.number, "time": when, **said})
     if json_path:
         emit(found, json_path)
     if json_path != "-":
@@ -120,3 +119,30 @@ def export(folder: Path, kind: str, db: str, version: int | None, json_path: str
         click.echo(done["file"])
     if json_path:
         emit(done, json_path)
+
+
+@click.command()
+@DB
+@WAIT
+@click.option("--dry-run", is_flag=True, help="Only say what would be removed.")
+@json_to("Write the removed files as JSON.")
+def vacuum(db: str, wait: float, dry_run: bool, json_path: str | None) -> None:
+    """Remove the files of commits that did not finish. Every version stays as it is.
+
+    The next commit removes them too. In an object store, where writers hold no lock, let none be at work.
+
+    \b
+    Example: ident vacuum --db coeff_db
+             ident vacuum --db coeff_db --dry-run --json -
+    """
+    from ident.database.leftovers import vacuum as run
+
+    found = run(db, wait, dry_run)
+    if json_path != "-":
+        verb = "would be removed" if dry_run else "removed"
+        for name, size in found.items():
+            click.echo(f"{verb}: {name} ({size} bytes)")
+        click.echo(f"{len(found)} files of commits that did not finish, {sum(found.values())} bytes")
+    if json_path:
+        files = [{"file": name, "bytes": size} for name, size in found.items()]
+        emit({"database": db, "dry_run": dry_run, "files": files}, json_path)

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-import hashlib
-import math
+import contextlib
+import json
+import random
+import time
 from pathlib import Path
 from typing import Any
 
@@ -13,15 +15,31 @@ from numpy.typing import NDArray
 
 from ident import __version__
 from ident.captive.published import TEST as PUBLISHED
+from ident.database.leftovers import check_folder, remove_unfinished
+from ident.database.lock import WAIT, held
 from ident.identification.identify import Identification
-from sim.boat.database import COUNTS, NUMBERS, axis_columns, brief, column_order, read_rows, to_column, versions
+from sim.boat.database import (
+    NUMBERS,
+    axis_columns,
+    column_order,
+    column_type,
+    digest,
+    open_table,
+    to_column,
+    whole_version,
+)
+from sim.boat.delta_log import LATEST, LOG, Entry, Log, has_versions, latest_said, seal
 from sim.boat.parts import parts_of, vehicle_terms
+from sim.boat.row_codec import correlation_texts
 from sim.files.errors import InputError
+from sim.files.storage import brief, engine, flush, is_url
 
-# A conflicting commit of another fit is looked at again this often.
-_TRIES = 3
-# Correlations below this are rounding.
-_LEAST_CORRELATION = 1e-6
+# Delta Lake's own housekeeping would delete the log of old versions, and then their data.
+FOR_EVER = {
+    "delta.enableExpiredLogCleanup": "false",
+    "delta.logRetentionDuration": "interval 36500 days",
+    "delta.deletedFileRetentionDuration": "interval 36500 days",
+}
 
 Array = NDArray[np.float64]
 
@@ -46,7 +64,7 @@ def database_rows(found: Identification) -> pd.DataFrame:
     columns = {axis: column for column, axis in axis_columns().items()}
     factor = {k: q.factor for k, q in found.campaign.header.quality.items()}
     stderr = np.sqrt(np.clip(np.diag(found.covariance), 0.0, None))
-    correlated = correlation_texts(found.covariance, stderr)
+    correlated = correlation_texts(found.covariance)
     rows = []
     for term in vehicle_terms(vehicle):
         for part in parts_of(term, vehicle):
@@ -86,26 +104,6 @@ def database_rows(found: Identification) -> pd.DataFrame:
     return table
 
 
-def correlation_texts(covariance: Array, stderr: Array) -> dict[int, str]:
-    """Estimate -> the estimates correlated with it, as text.
-
-    Parameters
-    ----------
-    covariance, stderr : (n, n) and (n,) of the estimates.
-
-    Returns
-    -------
-    Number of an estimate -> ``other:coefficient`` pairs; estimates without any are left out.
-    """
-    scale = np.outer(stderr, stderr)
-    matrix = np.divide(covariance, scale, out=np.zeros_like(covariance), where=scale > 0.0)
-    np.fill_diagonal(matrix, 0.0)
-    found: dict[int, list[str]] = {}
-    for i, j in np.argwhere(np.abs(matrix) > _LEAST_CORRELATION):
-        found.setdefault(int(i), []).append(f"{j}:{matrix[i, j]:.6g}")
-    return {i: " ".join(items) for i, items in found.items()}
-
-
 def _check_finite(rows: pd.DataFrame, where: str) -> None:
     """Refuse values, errors or axis values that are not finite (axes may be empty)."""
     finite = np.isfinite(rows[list(NUMBERS)].to_numpy(dtype=float)).all(axis=1)
@@ -116,34 +114,23 @@ def _check_finite(rows: pd.DataFrame, where: str) -> None:
         raise InputError(where, text, "loads and errors of a size the arithmetic holds")
 
 
-def digest(rows: pd.DataFrame) -> str:
-    """SHA-256 of the content of database rows, independent of their order."""
-    text = []
-    for row in rows[column_order()].itertuples(index=False):
-        cells = ["" if (isinstance(x, float) and math.isnan(x)) or x is None else repr(x) for x in row]
-        text.append("\t".join(cells))
-    return hashlib.sha256("\n".join(sorted(text)).encode()).hexdigest()
-
-
 def _arrow(rows: pd.DataFrame) -> Any:
     import pyarrow as pa
 
-    numbers = {*NUMBERS, *axis_columns()}
-    fields = [
-        pa.field(c, pa.float64() if c in numbers else pa.int64() if c in COUNTS else pa.string())
-        for c in column_order()
-    ]
+    kinds = {"double": pa.float64(), "int64": pa.int64(), "string": pa.string()}
+    fields = [pa.field(c, kinds[column_type(c)]) for c in column_order()]
     return pa.Table.from_pandas(rows[column_order()], schema=pa.schema(fields), preserve_index=False)
 
 
-def commit(path: str, rows: pd.DataFrame, metadata: dict[str, str]) -> tuple[int, bool]:
-    """Commit one vehicle's rows as a new version.
+def commit(path: str, rows: pd.DataFrame, metadata: dict[str, str], wait: float = WAIT) -> tuple[int, bool]:
+    """Commit one vehicle's rows as a new version; returns when data and log are on the disk.
 
     Parameters
     ----------
     path : Folder or object-store URL of the database; created when absent.
     rows : From ``database_rows``; replace the same vehicle's rows, keep other vehicles'.
     metadata : Stored with the commit beside digest, program version and parent.
+    wait : How long to wait for other writers [s].
 
     Returns
     -------
@@ -152,87 +139,119 @@ def commit(path: str, rows: pd.DataFrame, metadata: dict[str, str]) -> tuple[int
     Raises
     ------
     InputError
-        When the path cannot hold a database, or another fit committed at the same time.
+        When the path cannot hold a database, the database is damaged, or others keep writing.
     """
     _check_finite(rows, path)
+    if is_url(path):
+        return _commit(path, rows, metadata, wait)
     local = Path(path)
-    if "://" in path:
-        return _commit(path, rows, metadata)
-    from filelock import FileLock
-
     if local.exists() and not local.is_dir():
         raise InputError(path, "a file", "a folder for the database")
+    check_folder(local)
     try:
         local.mkdir(parents=True, exist_ok=True)
         # Creating a table is not exclusive in Delta Lake; the lock falls with its process.
-        with FileLock(local / ".lock"):
-            return _commit(path, rows, metadata)
+        with held(local, wait):
+            remove_unfinished(path)
+            return _commit(path, rows, metadata, wait)
     except OSError as error:
         raise InputError(path, f"cannot be written: {error}", "a folder you may write to") from error
 
 
-def _commit(path: str, rows: pd.DataFrame, metadata: dict[str, str]) -> tuple[int, bool]:
-    from deltalake import CommitProperties, write_deltalake
-    from deltalake.exceptions import CommitFailedError, DeltaError
-
+def _commit(path: str, rows: pd.DataFrame, metadata: dict[str, str], wait: float = WAIT) -> tuple[int, bool]:
     content, vehicle = digest(rows), str(rows["vehicle"].iloc[0])
-    for attempt in range(_TRIES):
-        parent, number = _latest(path, vehicle, content)
-        if number is not None:
-            return number, False
+    until = time.monotonic() + wait
+    while True:
+        log = Log(path) if has_versions(path) else None
+        beside: dict[str, str] = {}
+        if log is not None:
+            # Nothing is put on top of what is damaged.
+            beside = whole_version(log, log.last)
+            if beside.pop(vehicle, "") == content:
+                return log.last, False
+            log = _kept_for_ever(log)
         own = {
             "digest": content,
             "program": f"ident {__version__}",
-            "parent": metadata.get("parent", parent),
+            "parent": metadata.get("parent", str(log.last) if log else ""),
             "vehicle": vehicle,
+            "time": str(time.time_ns() // 1_000_000),
+            "beside": json.dumps(beside, sort_keys=True),
+            "after": str(log.last if log else -1),
         }
-        properties = CommitProperties(custom_metadata={**metadata, **own})
+        said = {**metadata, **own}
+        said["seal"] = seal(said)
+        if _written(path, rows, said, vehicle if log else None, last_try=time.monotonic() > until):
+            return _finished(path, said["seal"]), True
+        # Another fit committed in between, as it can on an object store: look again, not all at once.
+        time.sleep(random.uniform(0.05, 0.5))
+
+
+def _written(path: str, rows: pd.DataFrame, said: dict[str, str], replaced: str | None, last_try: bool) -> bool:
+    """Write a version; False when another was faster. ``replaced`` is None for a new database."""
+    from deltalake import CommitProperties, PostCommitHookProperties, write_deltalake
+    from deltalake.exceptions import CommitFailedError
+
+    how: dict[str, Any] = {"mode": "error", "configuration": FOR_EVER}
+    if replaced is not None:
+        predicate = "vehicle = '" + replaced.replace("'", "''") + "'"
+        how = {"mode": "overwrite", "schema_mode": "merge", "predicate": predicate}
+    with engine(path, "the version cannot be written", "room, and a path you may write to"):
         try:
-            if parent:
-                replaced = "vehicle = '" + vehicle.replace("'", "''") + "'"
-                write_deltalake(
-                    path,
-                    _arrow(rows),
-                    mode="overwrite",
-                    schema_mode="merge",
-                    predicate=replaced,
-                    commit_properties=properties,
-                )
-            else:
-                write_deltalake(path, _arrow(rows), mode="error", commit_properties=properties)
+            write_deltalake(
+                path,
+                _arrow(rows),
+                commit_properties=CommitProperties(custom_metadata=said),
+                post_commithook_properties=PostCommitHookProperties(cleanup_expired_logs=False),
+                **how,
+            )
         except CommitFailedError as error:
-            # Another fit committed in between: look again, then give up.
-            if attempt == _TRIES - 1:
+            if last_try:
                 raise InputError(
                     path, f"another fit wrote at the same time: {brief(error)}", "run the fit again"
                 ) from error
-            continue
-        except DeltaError as error:
-            raise InputError(
-                path, f"the database refused the version: {brief(error)}", "a database `ident fit` wrote"
-            ) from error
-        return _own_version(path, content), True
-    raise AssertionError("unreachable: the last try returns or raises")
+            return False
+    return True
 
 
-def _latest(path: str, vehicle: str, content: str) -> tuple[str, int | None]:
-    """Parent version (empty for a new database), and the version that holds ``content``."""
-    if "://" not in path and not (Path(path) / "_delta_log").is_dir():
-        return "", None
-    try:
-        parent = str(versions(path)[-1].number)
-    except InputError:
-        if "://" in path:
-            return "", None
-        raise
-    try:
-        present, number = read_rows(path, vehicle=vehicle)
-    except InputError:
-        # No rows of this vehicle yet.
-        return parent, None
-    return parent, number if digest(present) == content else None
+def _kept_for_ever(log: Log) -> Log:
+    """A table that was made before versions were kept for ever is told to keep them."""
+    from deltalake import CommitProperties
+
+    table = open_table(log.path, log.last, log)
+    with engine(log.path, "cannot be changed", "a database you may write to"):
+        if FOR_EVER.items() <= table.metadata().configuration.items():
+            return log
+        said = {
+            "message": "every version is kept for ever",
+            "program": f"ident {__version__}",
+            "time": str(time.time_ns() // 1_000_000),
+        }
+        said["seal"] = seal(said)
+        table.alter.set_table_properties(FOR_EVER, commit_properties=CommitProperties(custom_metadata=said))
+    return Log(log.path)
 
 
-def _own_version(path: str, content: str) -> int:
-    """The newest version with this content; another fit may have committed after it."""
-    return next(v.number for v in reversed(versions(path)) if v.digest == content)
+def _finished(path: str, sealed: str) -> int:
+    """Number of a version just written, read back, flushed and noted; another fit may have committed after it."""
+    log = Log(path)
+    number = next(v.number for v in reversed(log.versions) if v.metadata.get("seal") == sealed)
+    whole_version(log, number)
+    if log.storage.local is not None:
+        _flush(log.storage.local, number, log.entry(number))
+    # The version is there without the note, which only guards against the loss of its entry.
+    with contextlib.suppress(InputError):
+        if number > (latest_said(log.storage) or -1):
+            log.storage.write(LATEST, json.dumps({"version": number, "seal": sealed}).encode())
+    return number
+
+
+def _flush(local: Path, number: int, entry: Entry) -> None:
+    """Hand data, log and their folders over to the disk."""
+    for name in entry.added:
+        flush(local / name)
+    for file in (local / LOG).iterdir():
+        if file.name.startswith((f"{number:020d}.", f"{number - 1:020d}.", "_last_checkpoint")):
+            flush(file)
+    for folder in (local / LOG, local, local.absolute().parent):
+        flush(folder)

@@ -12,6 +12,7 @@ from ident.captive.campaign import Campaign, find_campaigns, read_campaign
 from ident.checks.check import check_campaign, refuse_errors
 from ident.checks.check import table as findings_table
 from ident.checks.findings import Finding
+from ident.database.lock import WAIT
 from ident.database.provenance import conversions
 from ident.database.store import commit, database_rows, digest
 from ident.fitting.notes import group_unused, group_warnings
@@ -83,7 +84,7 @@ def metadata(campaign: Campaign, found: Identification, message: str, findings: 
     }
 
 
-def fit(folder: Path, db: str, message: str = "", strict: bool = False) -> list[Fit]:
+def fit(folder: Path, db: str, message: str = "", strict: bool = False, wait: float = WAIT) -> list[Fit]:
     """Fit every campaign at or below ``folder`` into the database.
 
     Parameters
@@ -92,6 +93,7 @@ def fit(folder: Path, db: str, message: str = "", strict: bool = False) -> list[
     db : Database path or URL.
     message : Stored with the version.
     strict : Refuse a campaign with a quality finding of severity ``error``.
+    wait : How long to wait for other writers of the database [s].
 
     Returns
     -------
@@ -117,7 +119,7 @@ def fit(folder: Path, db: str, message: str = "", strict: bool = False) -> list[
     ready = [(campaign, found, database_rows(found)) for campaign, found in identified]
     done = []
     for (campaign, found, rows), findings in zip(ready, checked, strict=True):
-        version, new = commit(db, rows, metadata(campaign, found, message, findings))
+        version, new = commit(db, rows, metadata(campaign, found, message, findings), wait)
         done.append(Fit(campaign, found, rows, version, new, digest(rows), findings))
     return done
 

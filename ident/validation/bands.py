@@ -16,7 +16,7 @@ from scipy.special import chdtri
 from ident.validation.cluster import over_dask
 from ident.validation.draws import draw, scores
 from sim.boat.coefficients import Coefficients
-from sim.boat.database import correlation_pairs
+from sim.boat.row_codec import correlation_pairs
 from sim.boat.vehicle import Vehicle
 from sim.files.errors import InputError
 from sim.flight.case import Case, Series, in_radians

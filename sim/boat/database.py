@@ -90,9 +90,15 @@ def open_table(path: str, version: int | None = None, log: Log | None = None) ->
     if number < log.first:
         text = f"version {number} is gone: the log begins at version {log.first}"
         raise InputError(path, text, f"{log.first} to {log.last}; see `ident versions`")
-    with engine(path, "not a coefficient database", OURS, quiet=True):
-        table = DeltaTable(path, version=number)
-        stored = {f.name: str(f.type) for f in _schema(table)}
+    try:
+        with engine(path, "not a coefficient database", OURS):
+            table = DeltaTable(path, version=number)
+            stored = {f.name: str(f.type) for f in _schema(table)}
+    except InputError:
+        # An entry that is damaged is named; the engine does not say which.
+        _ = log.versions
+        raise
+    log.entry(number)
     check_columns(path, stored)
     return table
 
@@ -118,7 +124,7 @@ def check_columns(path: str, stored: Mapping[str, str]) -> None:
     """
     missing = [c for c in COLUMNS if c not in stored]
     if missing:
-        raise InputError(path, f"not a coefficient database: no column {', '.join(missing)}", OURS)
+        raise InputError(path, f"not a coefficient database: no columns {', '.join(missing[:3])} ...", OURS)
     unknown = [c for c in stored if c not in column_order()]
     if unknown:
         text = f"columns that this program does not know: {', '.join(map(repr, unknown))}"
@@ -161,42 +167,70 @@ def read_rows(path: str, version: int | None = None, vehicle: str | None = None)
     log = Log(path)
     number = log.last if version is None else version
     everything = stored_rows(log, number)
-    expected, complete = log.contents(number)
-    known = sorted(everything["vehicle"].dropna().unique())
-    if vehicle is not None and vehicle not in {*known, *expected}:
-        raise InputError(path, f"no coefficients of vehicle {vehicle!r}", ", ".join(known))
-    names = {*known, *(v for v in expected if v)} if vehicle is None else {vehicle}
-    for name in sorted(names):
-        _check(log, number, name, everything, expected, complete)
+    if vehicle is not None and vehicle not in vehicles_of(log, number, everything):
+        known = ", ".join(vehicles_of(log, number, everything))
+        raise InputError(path, f"no coefficients of vehicle {vehicle!r}", known)
+    check_digests(log, number, everything, vehicle)
     rows = everything if vehicle is None else everything[everything["vehicle"] == vehicle]
     order = ["vehicle", "coefficient", "part", *axis_columns()]
     return rows.sort_values(order, kind="stable").reset_index(drop=True), number
 
 
+def whole_version(log: Log, number: int) -> dict[str, str]:
+    """Vehicle -> digest of a version, every row of it read and checked. Raises as ``read_rows``."""
+    return check_digests(log, number, stored_rows(log, number))
+
+
+def vehicles_of(log: Log, number: int, everything: pd.DataFrame) -> list[str]:
+    """Vehicles that a version holds or should hold."""
+    expected = (name for name in log.contents(number)[0] if name)
+    return sorted({*everything["vehicle"].unique(), *expected})
+
+
+def check_digests(log: Log, number: int, everything: pd.DataFrame, vehicle: str | None = None) -> dict[str, str]:
+    """Refuse rows that are not those that were committed.
+
+    Parameters
+    ----------
+    log, number : Version.
+    everything : Its rows, from ``stored_rows``.
+    vehicle : Whose rows to check; every vehicle's when None.
+
+    Returns
+    -------
+    Vehicle -> digest.
+
+    Raises
+    ------
+    InputError
+        When the rows of a vehicle have another digest than its commit, or no commit vouches for them.
+    """
+    expected, complete = log.contents(number)
+    where = f"{log.path}, version {number}"
+    found: dict[str, str] = {}
+    for name in vehicles_of(log, number, everything) if vehicle is None else [vehicle]:
+        # A commit of early releases does not name its vehicle.
+        wanted = expected.get(name, expected.get("", ""))
+        if not wanted:
+            text = f"rows of {name!r} that no commit of `ident fit` vouches for"
+            raise InputError(where, text if complete else f"{text}: the log begins at version {log.first}", WHOLE)
+        rows = everything[everything["vehicle"] == name]
+        if not any(digest(rows, columns) == wanted for columns in _columns_of_the_time(log, number)):
+            text = f"rows of {name!r} are not those that were committed (digest {wanted[:16]})"
+            raise InputError(where, text, WHOLE)
+        found[name] = wanted
+    return found
+
+
 def stored_rows(log: Log, number: int) -> pd.DataFrame:
     """Rows of one version as they are stored, not checked. Raises ``InputError`` when they cannot be read."""
     table = open_table(log.path, number, log)
-    with engine(f"{log.path}, version {number}", "cannot be read", WHOLE, quiet=True):
-        read = table.to_pyarrow_table()
-    # A version written before an axis existed has no column for it.
-    rows = read.to_pandas().reindex(columns=column_order())
+    with engine(f"{log.path}, version {number}", "cannot be read", WHOLE):
+        # A version written before an axis existed has no column for it.
+        rows = table.to_pyarrow_table().to_pandas().reindex(columns=column_order())
     if rows["vehicle"].isna().any():
         raise InputError(f"{log.path}, version {number}", "rows without a vehicle", WHOLE)
     return rows
-
-
-def _check(
-    log: Log, number: int, vehicle: str, everything: pd.DataFrame, expected: dict[str, str], complete: bool
-) -> None:
-    """Refuse rows of a vehicle that are not those its commit wrote."""
-    wanted = expected.get(vehicle, expected.get("", ""))
-    where = f"{log.path}, version {number}"
-    if not wanted:
-        text = f"rows of {vehicle!r} that no commit of `ident fit` vouches for"
-        raise InputError(where, text if complete else f"{text}: the log begins at version {log.first}", WHOLE)
-    rows = everything[everything["vehicle"] == vehicle]
-    if not any(digest(rows, columns) == wanted for columns in _columns_of_the_time(log, number)):
-        raise InputError(where, f"rows of {vehicle!r} are not those that were committed ({wanted[:16]})", WHOLE)
 
 
 def _columns_of_the_time(log: Log, number: int) -> Iterator[list[str]]:
@@ -252,7 +286,5 @@ def own_version(path: str, vehicle: str, number: int) -> Version:
 
 def last_own(history: list[Version], vehicle: str, number: int) -> Version | None:
     """The last commit of a vehicle's rows up to version ``number``, of a history oldest first."""
-    own = [
-        v for v in history if v.number <= number and v.digest and v.metadata.get("vehicle", vehicle) == vehicle
-    ]
+    own = [v for v in history if v.number <= number and v.digest and v.metadata.get("vehicle", vehicle) == vehicle]
     return own[-1] if own else None

@@ -18,7 +18,7 @@ from typing import Any
 from urllib.parse import unquote
 
 from sim.files.errors import InputError
-from sim.files.storage import Storage, is_url
+from sim.files.storage import Storage
 
 LOG = "_delta_log"
 # Number and seal of the newest commit.
@@ -41,6 +41,8 @@ _ENGINE = {
     "txnId",
     "version",
 }
+# What an entry may say, of what this program writes.
+_KINDS = {"commitInfo", "metaData", "protocol", "add", "remove"}
 WHOLE = "a database with all its files; `ident doctor --db` says what can be restored"
 OURS = "a database written by `ident fit`"
 
@@ -106,8 +108,10 @@ def _entry(where: str, number: int, content: bytes) -> Entry:
         actions = [json.loads(line) for line in content.decode().splitlines() if line.strip()]
     except (ValueError, RecursionError) as error:
         raise damaged from error
-    if not actions or not all(isinstance(action, dict) for action in actions):
-        raise InputError(where, "an empty entry of the log", WHOLE)
+    if not all(isinstance(action, dict) for action in actions):
+        raise damaged
+    if not any(_KINDS.intersection(action) for action in actions):
+        raise InputError(where, "an entry of the log that says nothing", WHOLE)
     said: dict[str, Any] = {}
     added: dict[str, int] = {}
     columns: tuple[str, ...] = ()
@@ -123,10 +127,29 @@ def _entry(where: str, number: int, content: bytes) -> Entry:
     metadata = {k: str(v) for k, v in said.items() if k not in _ENGINE}
     if "seal" in metadata and metadata["seal"] != seal(metadata):
         raise InputError(where, "an entry of the log that is not what the commit sealed", WHOLE)
-    sealed = metadata.get("time")
-    operation = "" if "digest" in metadata or "seal" in metadata else str(said.get("operation", "unknown"))
-    version = Version(number, str(sealed or said.get("timestamp", "")), metadata, operation)
+    operation = "" if "digest" in metadata or "seal" in metadata else str(said.get("operation", "unknown operation"))
+    # Of this program's commits the time is sealed.
+    timestamp = metadata.get("time", str(said.get("timestamp", 0)))
+    if not timestamp.isdecimal():
+        raise damaged
+    version = Version(number, timestamp, metadata, operation)
     return Entry(version, added, columns)
+
+
+def latest_said(storage: Storage) -> int | None:
+    """Number of the newest commit, as it was noted when it was done; None where nothing is noted."""
+    content = storage.read(LATEST)
+    try:
+        return None if content is None else int(json.loads(content)["version"])
+    except (ValueError, KeyError, TypeError):
+        # A note on the commit, not the commit: it is written anew with the next.
+        return None
+
+
+def has_versions(path: str) -> bool:
+    """Whether anything was ever committed at a folder or URL."""
+    storage = Storage(path)
+    return any(_ENTRY.fullmatch(name) for name in storage.sizes(LOG)) or latest_said(storage) is not None
 
 
 class Log:
@@ -135,6 +158,7 @@ class Log:
     Parameters
     ----------
     path : Folder or object-store URL of the database.
+    but : An entry to leave out, ``_delta_log/`` and its name.
 
     Raises
     ------
@@ -142,7 +166,7 @@ class Log:
         When there is no database, or an entry is missing.
     """
 
-    def __init__(self, path: str) -> None:
+    def __init__(self, path: str, but: str = "") -> None:
         self.path = path
         self.storage = Storage(path)
         local = self.storage.local
@@ -150,34 +174,27 @@ class Log:
             found = "a file" if local.is_file() else "no coefficient database"
             raise InputError(path, found, f"{OURS}; choose it with --db")
         # Before the entries are listed: a commit in between makes more of them, never fewer.
-        latest = self._latest()
-        files = self.storage.sizes(LOG)
-        numbers = sorted(int(m[1]) for m in map(_ENTRY.fullmatch, files) if m)
-        if not numbers:
-            if is_url(path) and not files:
-                raise InputError(path, "no coefficient database", f"{OURS}; choose it with --db")
-            raise InputError(path, "a database without any version: its first fit did not finish", OURS)
-        self.first, self.last = numbers[0], numbers[-1]
+        latest = latest_said(self.storage)
+        every = self.storage.sizes(LOG)
+        files = {n: size for n, size in every.items() if _ENTRY.fullmatch(n) and f"{LOG}/{n}" != but}
+        numbers = sorted(int(name[:20]) for name in files)
+        if not numbers and latest is None:
+            nothing = "a database without any version: its first fit did not finish"
+            raise InputError(path, nothing if local is not None else "no coefficient database", OURS)
+        # Early releases let old entries be deleted, once a checkpoint held what they said.
+        self.first = numbers[0] if numbers and any(".checkpoint." in name for name in every) else 0
+        self.last = max([*numbers, -1 if latest is None else latest])
         self._entries: dict[int, Entry] = {}
-        gaps = sorted(set(range(self.first, self.last + 1)) - set(numbers))
-        if latest is not None and latest > self.last:
-            gaps = [*gaps, *range(self.last + 1, latest + 1)]
-        if gaps:
-            raise InputError(self._where(gaps[0]), f"the entry of version {gaps[0]} is missing from the log", WHOLE)
-        empty = [n for n in numbers if not files[f"{n:020d}.json"]]
-        if empty:
-            raise InputError(self._where(empty[0]), "an empty entry of the log", WHOLE)
+        for number in range(self.first, self.last + 1):
+            size = files.get(f"{number:020d}.json")
+            if size is None:
+                text = f"the entry of version {number} is missing from the log"
+                raise InputError(self._where(number), text, WHOLE)
+            if size == 0:
+                raise InputError(self._where(number), "an empty entry of the log: its commit did not finish", WHOLE)
 
     def _where(self, number: int) -> str:
         return f"{self.path}/{LOG}/{number:020d}.json"
-
-    def _latest(self) -> int | None:
-        content = self.storage.read(LATEST)
-        try:
-            return None if content is None else int(json.loads(content)["version"])
-        except (ValueError, KeyError, TypeError):
-            # A note on the last commit, not the commit: it is written anew with the next.
-            return None
 
     def entry(self, number: int) -> Entry:
         """One entry. Raises ``InputError`` when it is damaged or no longer there."""

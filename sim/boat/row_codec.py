@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import math
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -36,21 +35,21 @@ def digest(rows: pd.DataFrame, columns: Sequence[str]) -> str:
 
 
 def _texts(column: pd.Series[Any]) -> list[str]:
-    present = np.flatnonzero(column.notna().to_numpy())
-    found = [""] * len(column)
-    if column.dtype.kind in "fi":
-        for i, x in zip(present.tolist(), column.to_numpy()[present].tolist(), strict=True):
+    values = column.to_numpy()
+    if values.dtype.kind in "fi":
+        # Most cells of an axis are empty.
+        found = [""] * len(values)
+        present = np.flatnonzero(values == values)
+        for i, x in zip(present.tolist(), values[present].tolist(), strict=True):
             found[i] = repr(x)
         return found
     # Most texts of a column are alike, and some have many kilobytes.
-    known: dict[Any, str] = {}
-    values = column.tolist()
-    for i in present.tolist():
-        x = values[i]
-        if x not in known:
-            known[x] = repr(x)
-        found[i] = known[x]
-    return found
+    known: dict[str, str] = {}
+    return [known[x] if x in known else known.setdefault(x, _text(x)) for x in values.tolist()]
+
+
+def _text(x: Any) -> str:
+    return "" if x is None or x != x else repr(x)
 
 
 def correlation_texts(covariance: Array, names: Iterable[int] | None = None) -> dict[int, str]:

@@ -4,17 +4,11 @@ from __future__ import annotations
 
 import contextlib
 import os
-import sys
-import tempfile
-import threading
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 from sim.files.errors import InputError
-
-# The storage engine writes its own trace to the error stream of the process when it fails.
-_STREAM = threading.Lock()
 
 
 def is_url(path: str) -> bool:
@@ -29,33 +23,12 @@ def brief(error: BaseException) -> str:
 
 
 @contextlib.contextmanager
-def _own_stream() -> Iterator[None]:
-    """Keeps what native code writes to the error stream of the process, and shows it when nothing failed."""
-    with _STREAM:
-        try:
-            sys.stderr.flush()
-            kept = os.dup(2)
-        except (OSError, ValueError, AttributeError):
-            # No error stream at all.
-            yield
-            return
-        with tempfile.TemporaryFile() as said:
-            os.dup2(said.fileno(), 2)
-            try:
-                yield
-            finally:
-                os.dup2(kept, 2)
-                os.close(kept)
-
-
-@contextlib.contextmanager
-def engine(where: str, doing: str, allowed: str, quiet: bool = False) -> Iterator[None]:
+def engine(where: str, doing: str, allowed: str) -> Iterator[None]:
     """Calls of the storage engine: whatever it throws becomes one message.
 
     Parameters
     ----------
     where, doing, allowed : Of the ``InputError``; ``doing`` is followed by what the engine says.
-    quiet : Also keep native code from writing to the error stream.
 
     Raises
     ------
@@ -66,8 +39,7 @@ def engine(where: str, doing: str, allowed: str, quiet: bool = False) -> Iterato
     from pyarrow import ArrowException
 
     try:
-        with _own_stream() if quiet else contextlib.nullcontext():
-            yield
+        yield
     except InputError:
         raise
     except (DeltaError, ArrowException, OSError, ValueError, KeyError, TypeError, MemoryError) as error:
