@@ -69,7 +69,7 @@ def test_a_log_cut_short_is_refused_in_one_line(tmp_path):
     commit(str(path), fitted(write(tmp_path / "campaign")), {})
     log = next((path / "_delta_log").glob("*.json"))
     log.write_text(log.read_text()[:-400])
-    with pytest.raises(InputError, match="not a coefficient database") as caught:
+    with pytest.raises(InputError, match="a damaged entry of the log") as caught:
         versions(str(path))
     assert "\n" not in caught.value.found
     assert "0:" not in caught.value.found
