@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Counts = NDArray[np.int64]
 
-# An exchange must raise log det by more than rounding.
+# Rises of log det that differ by less are equal: an exchange must raise it by more.
 _LEAST_GAIN = 1e-9
 # Squared row over variance below this tells nothing of an unknown.
 _HELPS = 1e-6
@@ -98,19 +98,20 @@ def _best(design: Design, most: int | None, allowed: NDArray[np.bool_] | None = 
         gains[design.counts >= most] = -np.inf
     if allowed is not None:
         gains[~allowed] = -np.inf
-    return int(np.argmax(gains))
+    # The first of those that gain the same: which of them rounding puts first is the machine's.
+    return int(np.argmax(gains >= gains.max() - _LEAST_GAIN))
 
 
 def _exchange(design: Design, most: int | None) -> None:
     """Move single runs while that raises the determinant."""
     for _ in range(10 * int(design.counts.sum()) + 10):
         before = np.linalg.slogdet(design.covariance)[1]
-        best, move = _LEAST_GAIN, (-1, -1)
+        best, move = 0.0, (-1, -1)
         for i in np.flatnonzero(design.counts):
             design.change(int(i), -1)
             j = _best(design, most)
             gain = float(design.gains()[j] + before - np.linalg.slogdet(design.covariance)[1])
-            if gain > best:
+            if gain > best + _LEAST_GAIN:
                 best, move = gain, (int(i), j)
             design.change(int(i), 1)
         if move[0] < 0:
@@ -161,7 +162,11 @@ def fewest_runs(
 
 def _prune(design: Design, reached: Array) -> None:
     """Take away every run without which all unknowns stay within ``reached``."""
-    order = np.argsort(design.gains(), kind="stable")
+    gains = design.gains()
+    order = np.argsort(gains, kind="stable")
+    # Candidates that gain the same in their own order.
+    level = np.cumsum(np.diff(gains[order], prepend=gains[order[0]]) > _LEAST_GAIN)
+    order = order[np.lexsort((order, level))]
     for i in order[design.counts[order] > 0]:
         while design.counts[i]:
             design.change(int(i), -1)
