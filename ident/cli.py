@@ -7,7 +7,7 @@ from typing import Any
 import click
 
 from ident import __version__
-from ident.commands import animate, campaigns, maneuvers, versions
+from ident.commands import animate, campaigns, maneuvers, trials, versions
 
 
 class Commands(click.Group):
@@ -44,10 +44,11 @@ def main() -> None:
     ident runs raw_captive_data/     the run table as read, histories reduced
     ident report                     one HTML page on a version
     ident validate --case hzz20      fly a maneuver and compare
+    ident trial zigzag.csv           measure a recorded maneuver
     """
 
 
-for _module in (campaigns, maneuvers, animate, versions):
+for _module in (campaigns, maneuvers, trials, animate, versions):
     for _command in vars(_module).values():
         if isinstance(_command, click.Command):
             main.add_command(_command)

@@ -62,20 +62,23 @@ def _reaches(angle: Array, x: Array, y: Array, by: str) -> Metrics:
 
 
 def _steady(channels: Channels, turned: Array) -> Metrics:
-    """Means over the last 90 deg of heading, once 270 deg are turned."""
-    names = ("speed_ratio_steady", "drift_angle_steady_deg", "yaw_rate_steady_degps", "heel_steady_deg")
+    """Means over the last 90 deg of heading, once 270 deg are turned; of the channels that there are."""
+    speed = np.sqrt(sum(channels[k] ** 2 for k in "uvw" if k in channels))
+    of: Metrics = {"speed_ratio_steady": None, "drift_angle_steady_deg": None}
+    of |= {"yaw_rate_steady_degps": None} if "r" in channels else {}
+    of |= {"heel_steady_deg": None} if "phi" in channels else {}
     if turned[-1] < 1.5 * np.pi:
-        return dict.fromkeys(names)
+        return of
     last = turned >= turned[-1] - np.pi / 2.0
-    speed = np.sqrt(sum(channels[k] ** 2 for k in "uvw"))
     drift = np.arcsin(channels["v"] / speed)
-    values = (
-        np.mean(speed[last]) / speed[0],
-        np.degrees(np.mean(drift[last])),
-        np.degrees(np.mean(channels["r"][last])),
-        np.degrees(np.mean(channels["phi"][last])),
-    )
-    return {name: float(value) for name, value in zip(names, values, strict=True)}
+    values = {
+        "speed_ratio_steady": np.mean(speed[last]) / speed[0],
+        "drift_angle_steady_deg": np.degrees(np.mean(drift[last])),
+    }
+    for channel, name in (("r", "yaw_rate_steady_degps"), ("phi", "heel_steady_deg")):
+        if channel in channels:
+            values[name] = np.degrees(np.mean(channels[channel][last]))
+    return {name: float(value) for name, value in values.items()}
 
 
 def turning_circle(channels: Channels) -> Metrics:
@@ -83,8 +86,8 @@ def turning_circle(channels: Channels) -> Metrics:
 
     Parameters
     ----------
-    channels : ``x`` and ``y``; with ``psi`` also the metrics by heading; with ``u v w r phi``
-        the steady turn; with ``z`` and ``theta`` how depth is kept; with ``t`` times.
+    channels : ``x`` and ``y``; with ``psi`` also the metrics by heading; with ``u v`` (and
+        ``w r phi``) the steady turn; with ``z`` and ``theta`` how depth is kept; with ``t`` times.
 
     Returns
     -------
@@ -109,7 +112,7 @@ def turning_circle(channels: Channels) -> Metrics:
             t = channels["t"] - channels["t"][0]
             found["time_90_heading_s"] = at(t, crossing(turned, np.pi / 2.0))
             found["time_180_heading_s"] = at(t, crossing(turned, np.pi))
-        if all(k in channels for k in ("u", "v", "w", "r", "phi")):
+        if {"u", "v"} <= set(channels):
             found |= _steady(channels, turned)
     if "phi" in channels:
         found["heel_peak_deg"] = float(np.degrees(channels["phi"][np.argmax(np.abs(channels["phi"]))]))

@@ -1,0 +1,62 @@
+"""The command on recorded maneuvers: trial."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from ident.commands.shared import console_for, emit, json_to, out_file
+
+
+@click.command()
+@click.argument("path", metavar="FILE|DIR", type=click.Path(path_type=Path))
+@click.option("--spec", type=click.Path(path_type=Path), default=None, help="trial.toml: what the record does not say.")
+@click.option("--maneuver", default="", help='As "zigzag 20/20" or "turning_circle 35", instead of the spec\'s.')
+@click.option("--scale", type=click.FloatRange(min=0, min_open=True), default=None, help="Full scale over model scale.")
+@click.option("--length", "length", type=click.FloatRange(min=0, min_open=True), default=None, help="L [m], full scale.")
+@click.option("--figures", type=click.Path(path_type=Path), default=None, help="Folder for the plots of the report.")
+@out_file("Write the metrics as CSV.")
+@json_to("Write maneuver, assumptions, metrics with standard errors and findings.")
+def trial(
+    path: Path,
+    spec: Path | None,
+    maneuver: str,
+    scale: float | None,
+    length: float | None,
+    figures: Path | None,
+    out: Path | None,
+    json_path: str | None,
+) -> None:
+    """Measure a recorded maneuver: ITTC metrics with standard errors, IMO criteria, findings.
+
+    FILE is the record; DIR holds several, compared run by run and port against starboard.
+
+    \b
+    Example: ident trial zigzag.csv --json -
+             ident trial zigzag.csv --maneuver "zigzag 20/20" --figures reports
+             ident trial model.csv --spec trial.toml --out metrics.csv
+    """
+    from ident.output import check_folder
+    from ident.trials.report import measure_all, show, write_csv
+    from ident.trials.spec import load_spec
+
+    stated: dict[str, Any] = {"maneuver": maneuver or None, "scale": scale, "length_m": length}
+    statements = load_spec(spec).model_copy(update={k: v for k, v in stated.items() if v is not None})
+    if figures is not None:
+        check_folder(figures)
+    console = console_for(quiet=json_path == "-")
+    with console.status("reading and measuring"):
+        done = measure_all(path, statements)
+    show(done, console)
+    if figures is not None:
+        from ident.trials.figures import trial_figure
+
+        for one in done.trials:
+            console.print(f"figure: {trial_figure(one, figures)}", highlight=False)
+    if out is not None:
+        write_csv(done, out)
+        console.print(f"metrics: {out}", highlight=False)
+    if json_path:
+        emit(done.to_dict(), json_path)

@@ -1,0 +1,238 @@
+"""Smooth paths through noisy samples, with the errors of everything that is read off them.
+
+A channel is taken as a smooth function whose third derivative is white noise of unknown size,
+sampled with white errors of unknown size. Both sizes are found by restricted maximum likelihood
+(Wahba 1985, Annals of Statistics 13:1378-1402; Patterson and Thompson 1971, Biometrika 58:545-554).
+The posterior of the path is then a penalised spline (Eilers and Marx 1996, Statistical Science
+11:89-121) and its draws carry the error of any metric: a peak, a crossing, a diameter. That
+intervals of this posterior cover the truth as often as they say is shown by Wahba (1983), Journal
+of the Royal Statistical Society B 45:133-150, and tested here on flights.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import BSpline
+from scipy.linalg import LinAlgError, cho_solve_banded, cholesky_banded, solve_banded
+from scipy.optimize import minimize_scalar
+
+Array = NDArray[np.float64]
+_DEGREE = 4
+_ORDER = 3
+_THIRD = (-1.0, 3.0, -3.0, 1.0)
+# Knots of a path; finer than any maneuver of a boat asks for.
+_MOST_KNOTS = 1600
+# Decades of the smoothing parameter that are searched, about the one of a unit response.
+_DECADES = (-9.0, 13.0)
+
+
+@dataclass(frozen=True)
+class Samples:
+    """Measurements of a path or of its rate.
+
+    Attributes
+    ----------
+    time, value : (n,) [s] and in SI units.
+    derivative : 0 for the path itself, 1 for its rate.
+    sigma : Standard error of one sample.
+    """
+
+    time: Array
+    value: Array
+    derivative: int
+    sigma: float
+
+
+@dataclass(frozen=True)
+class SmoothPath:
+    """The posterior of a smooth path.
+
+    Attributes
+    ----------
+    knots : Of the B-splines.
+    mean : (k,) coefficients of the most likely path.
+    factor : Banded upper factor of the precision of the coefficients.
+    sigma : Standard error of one sample of the path.
+    """
+
+    knots: Array
+    mean: Array
+    factor: Array
+    sigma: float
+
+    def __call__(self, time: Array | float, derivative: int = 0) -> Array:
+        """The most likely path, or its derivative, at some times [s]."""
+        return np.asarray(BSpline(self.knots, self.mean, _DEGREE)(time, derivative))
+
+    def draws(self, time: Array, count: int, rng: np.random.Generator, derivative: int = 0) -> Array:
+        """(count, times) paths drawn from the posterior."""
+        normal = rng.standard_normal((self.mean.size, count))
+        away = solve_banded((0, len(self.factor) - 1), self.factor, normal)
+        return np.asarray(BSpline(self.knots, self.mean[:, None] + away, _DEGREE)(time, derivative).T)
+
+    def deviation(self, time: Array | float, derivative: int = 0) -> Array:
+        """Standard error of the path, or its derivative, at some times."""
+        at = np.atleast_1d(np.asarray(time, dtype=float))
+        eye = np.eye(self.mean.size)
+        basis = np.asarray(BSpline(self.knots, eye, _DEGREE)(at, derivative)) if at.size <= 64 else None
+        if basis is None:
+            return np.concatenate([self.deviation(piece, derivative) for piece in np.array_split(at, at.size // 64 + 1)])
+        solved = cho_solve_banded((self.factor, False), basis.T)
+        return np.sqrt(np.maximum(np.einsum("ij,ji->i", basis, solved), 0.0))
+
+
+def _penalty(knots: Array) -> Array:
+    """Of the integral of the squared third derivative, upper banded (Eilers and Marx)."""
+    size = len(knots) - _DEGREE - 1
+    bands = np.zeros((_DEGREE + 1, size))
+    for row in range(_ORDER + 1):
+        for column in range(row, _ORDER + 1):
+            # Row i of the differences touches coefficients i to i + 3.
+            bands[_DEGREE - (column - row), column : size - _ORDER + column] += _THIRD[row] * _THIRD[column]
+    return bands / _step(knots) ** (2 * _ORDER - 1)
+
+
+def _step(knots: Array) -> float:
+    return float(knots[_DEGREE + 1] - knots[_DEGREE])
+
+
+def _roughness(knots: Array, coefficients: Array) -> float:
+    """The integral of the squared third derivative."""
+    return float(np.sum(np.diff(coefficients, _ORDER) ** 2)) / _step(knots) ** (2 * _ORDER - 1)
+
+
+def knots_for(time: Array, lo: float | None = None, hi: float | None = None) -> Array:
+    """Evenly spaced knots of a path over some sample times."""
+    start, end = float(time[0] if lo is None else lo), float(time[-1] if hi is None else hi)
+    steps = np.diff(np.unique(time))
+    typical = float(np.median(steps)) if steps.size else end - start
+    count = int(np.clip(math.ceil((end - start) / max(typical, 1e-12)), 4, _MOST_KNOTS))
+    step = (end - start) / count
+    return start + step * np.arange(-_DEGREE, count + _DEGREE + 1)
+
+
+def _values(knots: Array, time: Array, derivative: int) -> tuple[Array, NDArray[np.int64]]:
+    """Values of the five B-splines at each time, and the first of them."""
+    count = len(knots) - 2 * _DEGREE - 1
+    place = (time - knots[_DEGREE]) / _step(knots)
+    first = np.clip(np.floor(place).astype(np.int64), 0, count - 1)
+    element = BSpline.basis_element(np.arange(_DEGREE + 2.0), extrapolate=False)
+    element = element.derivative(derivative) if derivative else element
+    values = np.stack([np.nan_to_num(element(place - first + _DEGREE - k)) for k in range(_DEGREE + 1)], axis=1)
+    return values / _step(knots) ** derivative, first
+
+
+def _fitted(knots: Array, coefficients: Array, samples: Samples) -> Array:
+    """The path, or its rate, at the times of some samples."""
+    return np.asarray(BSpline(knots, coefficients, _DEGREE)(samples.time, samples.derivative))
+
+
+def _gram(knots: Array, samples: Samples) -> tuple[Array, Array]:
+    """Banded B'WB and B'Wy of some samples."""
+    values, first = _values(knots, samples.time, samples.derivative)
+    size, weight = len(knots) - _DEGREE - 1, samples.sigma**-2.0
+    bands, right = np.zeros((_DEGREE + 1, size)), np.zeros(size)
+    for i in range(_DEGREE + 1):
+        np.add.at(right, first + i, weight * values[:, i] * samples.value)
+        for j in range(i, _DEGREE + 1):
+            np.add.at(bands[_DEGREE - (j - i)], first + j, weight * values[:, i] * values[:, j])
+    return bands, right
+
+
+def _log_det(factor: Array) -> float:
+    return float(2.0 * np.sum(np.log(factor[-1])))
+
+
+def _solve(bands: Array, right: Array) -> tuple[Array, Array]:
+    factor = cholesky_banded(bands)
+    return factor, cho_solve_banded((factor, False), right)
+
+
+def noise_of(time: Array, value: Array) -> float:
+    """Standard error of one sample of a smooth path, by restricted maximum likelihood.
+
+    Parameters
+    ----------
+    time, value : (n,) [s], growing, and the samples; at least 8.
+    """
+    return _likely(time, value)[1]
+
+
+def _likely(time: Array, value: Array) -> tuple[float, float]:
+    """Spectral density of the third derivative, and the noise, at the largest likelihood."""
+    knots = knots_for(time)
+    scale = float(np.std(value)) or 1.0
+    one = Samples(time, (value - value.mean()) / scale, 0, 1.0)
+    bands, right = _gram(knots, one)
+    penalty = _penalty(knots)
+    free, rank = time.size - _ORDER, right.size - _ORDER
+    unit = _step(knots) ** (2 * _ORDER - 1)
+
+    def rest(weight: float) -> tuple[Array, float]:
+        factor, solved = _solve(bands + weight * penalty, right)
+        # Residuals and roughness by themselves: their sum as a difference would be lost in rounding.
+        left = float(np.sum((one.value - _fitted(knots, solved, one)) ** 2)) + weight * _roughness(knots, solved)
+        return factor, max(left, 1e-28 * time.size)
+
+    def loss(decade: float) -> float:
+        weight = unit * 10.0**decade
+        try:
+            factor, left = rest(weight)
+        except LinAlgError:
+            return math.inf
+        return free * math.log(left / free) + _log_det(factor) - rank * math.log(weight)
+
+    grid = np.arange(*_DECADES, 0.5)
+    best = grid[int(np.argmin([loss(d) for d in grid]))]
+    found = minimize_scalar(loss, bounds=(best - 0.5, best + 0.5), method="bounded", options={"xatol": 0.02})
+    weight = unit * 10.0 ** float(found.x)
+    sigma = scale * math.sqrt(rest(weight)[1] / free)
+    return sigma**2 / weight, sigma
+
+
+def smooth(samples: list[Samples], lo: float | None = None, hi: float | None = None) -> SmoothPath:
+    """The path through samples of it, and of its rate where there are any.
+
+    Parameters
+    ----------
+    samples : The first of the path itself; a ``sigma`` of 0 is found from the samples.
+    lo, hi : Times between which the path is wanted; those of the first samples when None.
+
+    Returns
+    -------
+    SmoothPath; the size of its third derivative is that of the largest likelihood.
+    """
+    first = samples[0]
+    density, sigma = _likely(first.time, first.value)
+    centre = float(first.value.mean())
+    told = [replace(first, value=first.value - centre, sigma=first.sigma or sigma), *samples[1:]]
+    knots = knots_for(first.time, lo, hi)
+    parts = [_gram(knots, s) for s in told]
+    bands, right = sum(p[0] for p in parts), sum(p[1] for p in parts)
+    penalty = _penalty(knots)
+    if len(told) > 1 or first.sigma:
+        density = _density(knots, told, bands, right, density)
+    factor, solved = _solve(bands + penalty / density, right)
+    # B-splines sum to one: the mean is a shift of every coefficient.
+    return SmoothPath(knots, solved + centre, factor, told[0].sigma)
+
+
+def _density(knots: Array, told: list[Samples], bands: Array, right: Array, near: float) -> float:
+    """Spectral density of the third derivative at the largest likelihood, where the noise is known."""
+    penalty, rank = _penalty(knots), right.size - _ORDER
+
+    def loss(decade: float) -> float:
+        weight = 10.0**-decade / near
+        try:
+            factor, solved = _solve(bands + weight * penalty, right)
+        except LinAlgError:
+            return math.inf
+        left = sum(float(np.sum((s.value - _fitted(knots, solved, s)) ** 2)) / s.sigma**2 for s in told)
+        return left + weight * _roughness(knots, solved) + _log_det(factor) - rank * math.log(weight)
+
+    best = minimize_scalar(loss, bounds=(-4.0, 4.0), method="bounded", options={"xatol": 0.02})
+    return near * 10.0 ** float(best.x)

@@ -1,0 +1,233 @@
+"""When the maneuver began and from what course, place and speed: stated, or found on the record."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ident.timeseries.smoothing import Samples, SmoothPath, smooth
+from ident.trials.consistency import path_of, regressed
+from ident.trials.maneuvers import Maneuver, control_of, holds
+from ident.trials.reading import Recording
+from ident.trials.spec import TrialFile
+from sim.files.errors import InputError
+from sim.files.record import Record
+
+Array = NDArray[np.float64]
+# What an approach needs to be called one: seconds and samples.
+_APPROACH_S, _APPROACH_SAMPLES, _LONGEST_S = 5.0, 8, 60.0
+# Seconds before the execute that are looked at with the maneuver.
+_RUN_UP_S = 20.0
+# Two channels of one motion are taken together when they agree to this.
+_CLOSE = 0.02
+# Share of a body rate by which it may differ from the rate of the angle, along the record.
+_BODY_RATE = 0.005
+_NOISE = {"psi": "heading_deg", "theta": "pitch_deg", "phi": "roll_deg", "r": "yaw_rate_degps", "north": "position_m"}
+_NOISE |= {"east": "position_m", "z": "depth_m", "U": "speed_mps", "u": "speed_mps"}
+
+
+@dataclass(frozen=True)
+class Start:
+    """The execute and the state there.
+
+    Attributes
+    ----------
+    time, time_sigma : Of the execute on the record's clock [s].
+    angle, angle_sigma : Course, or pitch, before it [rad]; None where it is that of the path at the
+        execute, with the path's own error.
+    said : How they are known.
+    """
+
+    time: float
+    time_sigma: float
+    angle: float | None
+    angle_sigma: float
+    said: tuple[str, ...]
+
+
+def stated_noise(spec: TrialFile, channel: str) -> float:
+    """Standard error of a sample as stated, SI; zero when it is not."""
+    value = getattr(spec.noise, _NOISE.get(channel, ""), None) if channel in _NOISE else None
+    angular = channel in ("psi", "theta", "phi", "r")
+    return 0.0 if value is None else math.radians(value) if angular else float(value)
+
+
+def _of_control(one: Recording, control: Record) -> tuple[float, float, str] | None:
+    """Execute by the first step of the rudder or planes, or of the revolutions."""
+    levels = holds(control)
+    first = next((h for h in levels if abs(h.value) > math.radians(0.5)), None)
+    if first is None:
+        return None
+    header = one.headers[control.channel]
+    t, x = control.abscissa, control.value
+    if first.start <= t[0] + 1e-9:
+        return float(t[0]), 0.0, f"execute at the first sample: {header} is at its angle there"
+    quiet = [h for h in levels if h.end < first.start]
+    base = quiet[-1].value if quiet else 0.0
+    step = first.value - base
+    share = (x - base) / step
+    moving = np.flatnonzero((t <= first.start + 1e-9) & (share > 0.1) & (share < 0.9) & (t > (quiet[-1].end if quiet else t[0])))
+    if moving.size >= 2:
+        slope, offset = np.polyfit(t[moving], share[moving], 1)
+        start = float(-offset / slope)
+        return start, float(np.median(np.diff(t))) / math.sqrt(12.0), f"execute at {start:.2f} s, where {header} begins to move"
+    after = int(np.argmax((share > 0.5) & (t > (quiet[-1].end if quiet else t[0]) - 1e-9)))
+    before, now = float(t[max(after - 1, 0)]), float(t[after])
+    text = f"execute between {before:.2f} and {now:.2f} s, where {header} leaves {math.degrees(base):.1f} deg"
+    return 0.5 * (before + now), (now - before) / math.sqrt(12.0), text
+
+
+def _onset(record: Record, path: SmoothPath) -> tuple[float, float, str]:
+    """Execute by the heading, which leaves its course with the second or third power of time."""
+    t = record.abscissa
+    grid = np.linspace(t[0], t[-1], 6000)
+    base = float(path(t[0]))
+    away = np.abs(path(grid) - base)
+    small = max(math.radians(0.5), 4.0 * path.sigma)
+    late = np.flatnonzero(away > 4.0 * small)
+    if not late.size:
+        return float(t[0]), 0.0, "execute at the first sample: nothing in the record says otherwise"
+    last = int(np.flatnonzero(away[: late[0]] < small)[-1]) if (away[: late[0]] < small).any() else 0
+    first, second = float(grid[last]), float(grid[late[0]])
+    # away ~ (t - t0)^k passes small and four times small.
+    starts = [(4.0 ** (1.0 / k) * first - second) / (4.0 ** (1.0 / k) - 1.0) for k in (2.0, 3.0)]
+    start, sigma = 0.5 * sum(starts), abs(starts[1] - starts[0]) / 2.0
+    if start - t[0] <= max(2.0 * sigma, 3.0 * float(np.median(np.diff(t))), 0.1 * (second - t[0])):
+        return float(t[0]), 0.0, "execute at the first sample: the boat begins to turn with the record; no rudder is recorded"
+    text = f"execute at {start:.1f} s +- {sigma:.1f} s, from when the boat begins to turn; no rudder is recorded: execute_s states it"
+    return start, sigma, text
+
+
+def _approach(record: Record, until: float, sigma: float) -> tuple[float, float, str] | None:
+    """Mean angle before the execute, where the record has an approach."""
+    inside = (record.abscissa < until - 1e-9) & (record.abscissa >= until - _LONGEST_S)
+    t, x = record.abscissa[inside], record.value[inside]
+    if t.size < _APPROACH_SAMPLES or t[-1] - t[0] < _APPROACH_S:
+        return None
+    mean, spread = float(np.mean(x)), float(np.std(x, ddof=1))
+    pieces = max(2, 1 + int(np.count_nonzero((x[:-1] - mean) * (x[1:] - mean) < 0.0)))
+    error = max(spread / math.sqrt(pieces), sigma / math.sqrt(t.size))
+    text = f"{math.degrees(mean):.3f} deg +- {math.degrees(error):.3f}, the mean of {t[-1] - t[0]:.0f} s of approach"
+    return mean, error, text
+
+
+def start_of(one: Recording, maneuver: Maneuver, spec: TrialFile) -> Start:
+    """The execute and the angle before it.
+
+    Raises
+    ------
+    InputError
+        For a stated execute outside the record.
+    """
+    vertical = maneuver.kind in ("vertical_zigzag", "rise", "depth_change")
+    angle = "theta" if vertical else "psi"
+    record = one.channels.get("phi") if maneuver.kind == "roll_decay" else one.channels.get(angle)
+    begin, end = float(one.rows[0][0]), float(one.rows[0][-1])
+    control = control_of(one, vertical)
+    said: list[str] = []
+    if spec.execute_s is not None:
+        time = (spec.execute_s - one.zero) * math.sqrt(spec.scale)
+        if not begin - 1e-9 <= time < end:
+            allowed = f"a time of the record: {one.zero:g} to {one.zero + end / math.sqrt(spec.scale):g} s"
+            raise InputError(f"{one.file}, key execute_s", f"{spec.execute_s:g}", allowed)
+        execute = (time, 0.0, f"execute at {spec.execute_s:g} s: stated")
+    else:
+        by_control = _of_control(one, control) if control is not None else None
+        if by_control is None and maneuver.kind == "stopping" and "n" in one.channels:
+            by_control = _of_revolutions(one)
+        if by_control is None and (record is None or maneuver.kind in ("roll_decay", "course_keeping", "depth_change")):
+            by_control = (begin, 0.0, "execute at the first sample")
+        execute = by_control or _onset(record, path_of(record))  # type: ignore[arg-type]
+    said.append(execute[2])
+    known: tuple[float, float] | None = None
+    if record is not None and maneuver.kind != "roll_decay":
+        known = _angle(record, execute[0], angle, spec, said)
+    sigma = math.hypot(execute[1], one.time_sigma)
+    return Start(execute[0], sigma, known[0] if known else None, known[1] if known else 0.0, tuple(said))
+
+
+def _angle(record: Record, execute: float, angle: str, spec: TrialFile, said: list[str]) -> tuple[float, float] | None:
+    name = "initial heading" if angle == "psi" else "initial pitch"
+    if angle == "psi" and spec.initial.heading_deg is not None:
+        said.append(f"{name} {spec.initial.heading_deg:g} deg: stated")
+        turns = round((float(record.at(execute)) - math.radians(spec.initial.heading_deg)) / (2.0 * math.pi))
+        return math.radians(spec.initial.heading_deg) + 2.0 * math.pi * turns, 0.0
+    mean = _approach(record, execute, stated_noise(spec, angle))
+    if mean:
+        said.append(f"{name} {mean[2]}")
+        return mean[0], mean[1]
+    said.append(f"{name}: that of the smooth path at the execute; no approach is recorded")
+    return None
+
+
+def _of_revolutions(one: Recording) -> tuple[float, float, str] | None:
+    n = one.channels["n"]
+    first = float(np.median(n.value[:5]))
+    away = np.flatnonzero(np.abs(n.value - first) > 0.1 * max(abs(first), 1e-9))
+    if not away.size:
+        return None
+    i = int(away[0])
+    if i == 0:
+        return float(n.abscissa[0]), 0.0, "execute at the first sample"
+    before, now = float(n.abscissa[i - 1]), float(n.abscissa[i])
+    text = f"execute between {before:.2f} and {now:.2f} s, where {one.headers['n']} leaves its value"
+    return 0.5 * (before + now), (now - before) / math.sqrt(12.0), text
+
+
+def paths(one: Recording, start: Start, spec: TrialFile) -> tuple[dict[str, SmoothPath], list[str]]:
+    """Smooth paths of the channels from shortly before the execute on, rates taken with their angles."""
+    found: dict[str, SmoothPath] = {}
+    said: list[str] = []
+    for name, record in one.channels.items():
+        if name in ("dH", "dV", "dH_order", "course", "p", "q", "r", "udot"):
+            continue
+        samples, path = _from_run_up(record, start.time, stated_noise(spec, name))
+        if path is None:
+            continue
+        begin = float(samples[0].time[0])
+        rate = {"psi": "r", "theta": "q", "phi": "p"}.get(name, "")
+        path = smooth(samples)
+        if rate in one.channels:
+            more = one.channels[rate].kept(one.channels[rate].abscissa >= begin - 1e-9)
+            joined = _joined(samples, more, path, stated_noise(spec, rate))
+            if joined is not None:
+                path = joined
+                said.append(f"{one.headers[name]} and {one.headers[rate]} taken together: they agree")
+        found[name] = path
+    return found, said
+
+
+def _from_run_up(record: Record, execute: float, noise: float) -> tuple[list[Samples], SmoothPath | None]:
+    """Samples from shortly before the execute on; from the execute on where the noise before it is another."""
+    step = float(np.median(np.diff(record.abscissa)))
+    best: tuple[list[Samples], SmoothPath | None] = ([], None)
+    for run_up in (1.01 * step, _RUN_UP_S):
+        inside = record.kept(record.abscissa >= execute - run_up - 1e-9)
+        if len(inside) < 8:
+            continue
+        samples = [Samples(inside.abscissa, inside.value, 0, noise)]
+        path = smooth(samples)
+        if best[1] is None or best[1].sigma / 1.4 <= path.sigma <= 1.4 * best[1].sigma:
+            best = (samples, path)
+    return best
+
+
+def _joined(samples: list[Samples], rate: Record, path: SmoothPath, noise: float) -> SmoothPath | None:
+    """The path through an angle and its rate, where the two agree to a hundredth."""
+    lo, hi = samples[0].time[0], samples[0].time[-1]
+    inside = rate.kept((rate.abscissa >= lo) & (rate.abscissa <= hi))
+    if len(inside) < 16:
+        return None
+    pair = regressed(inside.abscissa, inside.value, path(inside.abscissa, 1))
+    own = path_of(inside).sigma
+    offset_error = max(own, 1e-12) / math.sqrt(len(inside))
+    if pair is None or abs(pair.slope - 1.0) > _CLOSE or abs(pair.offset) > 6.0 * offset_error + 1e-6:
+        return None
+    first = Samples(samples[0].time, samples[0].value, 0, samples[0].sigma or path.sigma)
+    # A body rate is not quite the rate of its Euler angle: heel and pitch stand between them.
+    value = (inside.value - pair.offset) / pair.slope
+    sigma = math.hypot(noise or own, _BODY_RATE * float(np.sqrt(np.mean(value**2))))
+    return smooth([first, Samples(inside.abscissa, value, 1, sigma)])

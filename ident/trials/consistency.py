@@ -1,0 +1,250 @@
+"""Whether the channels of a record can be those of one boat: rates, speeds and tracks held against one another."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ident.checks.findings import Finding
+from ident.timeseries.smoothing import Samples, SmoothPath, smooth
+from ident.trials.earth import drift
+from ident.trials.reading import Recording
+from sim.files.errors import InputError
+from sim.files.record import Record
+
+Array = NDArray[np.float64]
+# Rate -> the channel that it is the rate of.
+RATES = {"r": "psi", "p": "phi", "q": "theta", "udot": "u"}
+_NAMES = {"r": "yaw rate", "p": "roll rate", "q": "pitch rate", "udot": "surge acceleration", "psi": "heading"}
+_NAMES |= {"phi": "heel", "theta": "pitch", "u": "speed ahead", "U": "speed"}
+# Factors by which a channel is off when its unit is another than the header says.
+_FACTORS = {
+    57.29578: "degrees and radians",
+    60.0: "minutes and seconds",
+    1.943844: "knots and m/s",
+    3.6: "km/h and m/s",
+    3.280840: "feet and metres",
+    1.852: "knots and km/h",
+    3437.747: "deg/min and rad/s",
+    9.80665: "g and m/s2",
+    1000.0: "thousandths",
+}
+_SAME, _LIKE, _ALIKE = 0.1, 0.06, 0.9
+_MOST_DRIFT = math.radians(40.0)
+# Heading and track of a boat turn by angles that differ by less than this factor.
+_TURNS_ALIKE = 2.0
+
+
+@dataclass(frozen=True)
+class Pair:
+    """A channel regressed on what it should be: slope, offset, correlation, and where they differ most."""
+
+    slope: float
+    offset: float
+    correlation: float
+    worst: float
+
+    @property
+    def agrees(self) -> bool:
+        """One curve, within a tenth."""
+        return self.correlation > _ALIKE and abs(self.slope - 1.0) < _SAME
+
+
+def factor_between(ratio: float) -> tuple[float, str] | None:
+    """The unit slip that a ratio of two channels shows, and its factor; None for none."""
+    size = abs(ratio)
+    for value, words in _FACTORS.items():
+        for one in (value, 1.0 / value):
+            if abs(size / one - 1.0) < _LIKE:
+                return one, words
+    return None
+
+
+def regressed(time: Array, value: Array, like: Array) -> Pair | None:
+    """A channel on what it should be; None where that does not move."""
+    spread = float(np.std(like))
+    if spread == 0.0 or float(np.std(value)) == 0.0 or value.size < 8:
+        return None
+    slope, offset = np.polyfit(like, value, 1)
+    correlation = float(np.corrcoef(like, value)[0, 1])
+    away = np.abs(value - like)
+    return Pair(float(slope), float(offset), correlation, float(time[int(np.argmax(away))]))
+
+
+def path_of(record: Record) -> SmoothPath:
+    """The smooth path through a record."""
+    return smooth([Samples(record.abscissa, record.value, 0, 0.0)])
+
+
+def _finding(one: Recording, check: str, columns: tuple[str, ...], at: float, what: str, remedy: str, severity: str = "error") -> Finding:
+    headers = tuple(one.headers.get(c, c) for c in columns)
+    return Finding(check, severity, one.file, (one.row_at(at),), headers, what, remedy)
+
+
+def _inside(record: Record, time: Array) -> NDArray[np.bool_]:
+    return np.asarray((time >= record.abscissa[0]) & (time <= record.abscissa[-1]))
+
+
+def _rates(one: Recording, slopes: dict[str, SmoothPath]) -> list[Finding]:
+    """Rates against the angles they are rates of, and against those of others."""
+    found = []
+    for name in RATES:
+        if name not in one.channels:
+            continue
+        rate = one.channels[name]
+        pairs = {}
+        for angle, path in slopes.items():
+            if (angle == "u") != (name == "udot"):
+                continue
+            inside = _inside(one.channels[angle], rate.abscissa)
+            at = rate.abscissa[inside]
+            pair = regressed(at, rate.value[inside], path(at, 1)) if inside.sum() >= 8 else None
+            if pair:
+                pairs[angle] = pair
+        found += _of_rate(one, name, pairs)
+    return found
+
+
+def _of_rate(one: Recording, name: str, pairs: dict[str, Pair]) -> list[Finding]:
+    own = pairs.get(RATES[name])
+    others = {a: p for a, p in pairs.items() if a != RATES[name] and abs(p.correlation) > 0.95}
+    header = one.headers[name]
+    if others and (own is None or abs(own.correlation) < 0.8):
+        angle, pair = max(others.items(), key=lambda item: abs(item[1].correlation))
+        right = next(k for k, v in RATES.items() if v == angle)
+        what = (
+            f"{header} is read as {_NAMES[name]} {name}, and is the rate of {_NAMES[angle]} {angle} "
+            f"(correlation {pair.correlation:.3f}, slope {pair.slope:.3g}): channels exchanged"
+        )
+        remedy = f'trial.toml: [channels] "{header}" = "{right} [UNIT]", or mend the file'
+        return [_finding(one, "exchanged_channels", (name, angle), pair.worst, what, remedy)]
+    if own is None or own.agrees:
+        return []
+    words = f"{header} against the rate of {one.headers[RATES[name]]}: slope {own.slope:.4g}, correlation {own.correlation:.3f}"
+    slip = factor_between(own.slope) if abs(own.correlation) > _ALIKE else None
+    if slip:
+        remedy = f'state the right unit in trial.toml: [channels] "{header}" = "{name} [UNIT]"'
+        return [_finding(one, "unit_slip", (name, RATES[name]), own.worst, f"{words}: off by {slip[0]:.4g}, {slip[1]}", remedy)]
+    if own.correlation < -_ALIKE:
+        remedy = "state the frame of the record in trial.toml: [frame], or mend the sign of one of the two"
+        return [_finding(one, "sign_of_a_rate", (name, RATES[name]), own.worst, f"{words}: they turn against one another", remedy)]
+    if own.correlation < _ALIKE and abs(own.slope) < 2.0 and abs(own.slope) > 0.5:
+        # A noisy rate of the right size: nothing is wrong with it but the noise.
+        return []
+    remedy = "the rate is not used; look at its unit, its zero and its filter"
+    return [_finding(one, "rate_against_angle", (name, RATES[name]), own.worst, words, remedy, "warning")]
+
+
+def _track(one: Recording) -> list[Finding]:
+    """Track against speed and heading."""
+    if not {"north", "east"} <= set(one.channels):
+        return []
+    north, east = one.channels["north"], one.channels["east"]
+    paths = path_of(north), path_of(east)
+    t = north.abscissa
+    speed = np.hypot(paths[0](t, 1), paths[1](t, 1))
+    middle = speed[len(speed) // 20 : len(speed) - len(speed) // 20]
+    found = []
+    name = next((n for n in ("U", "u") if n in one.channels), None)
+    if name and float(np.median(middle)) > 0.0:
+        log = one.channels[name]
+        ratio = float(np.median(speed / np.maximum(np.abs(log.at(t)), 1e-9)))
+        worst = float(t[int(np.argmax(np.abs(speed - ratio * log.at(t))))])
+        found += _speed_ratio(one, name, ratio, worst)
+    if "psi" in one.channels:
+        found += _course(one, np.unwrap(np.arctan2(paths[1](t, 1), paths[0](t, 1))), t)
+        away = drift(one.channels["psi"], north, east, [(0, 1.0), (1, 1.0)])
+        if away is not None and away > _MOST_DRIFT:
+            course = np.arctan2(paths[1](t, 1), paths[0](t, 1))
+            gap = np.abs(np.angle(np.exp(1j * (course - one.channels["psi"].at(t)))))
+            what = f"track and heading differ by {math.degrees(away):.0f} deg (root mean square)"
+            remedy = "state the axes in trial.toml: [axes] x = 'east', y = 'north', ..., or the frame; the two cannot both be right"
+            found.append(_finding(one, "track_against_heading", ("north", "east", "psi"), float(t[int(np.argmax(gap))]), what, remedy))
+    return found
+
+
+def _course(one: Recording, course: Array, t: Array) -> list[Finding]:
+    """Turns of the track against those of the heading: in degrees and radians they differ by 57.3."""
+    psi = one.channels["psi"]
+    inside = _inside(psi, t)
+    pair = regressed(t[inside], course[inside], psi.at(t[inside])) if inside.sum() >= 8 else None
+    if pair is None or np.ptp(course[inside]) < math.radians(10.0) or pair.correlation < 0.8:
+        return []
+    if 1.0 / _TURNS_ALIKE < pair.slope < _TURNS_ALIKE:
+        return []
+    slip = factor_between(pair.slope / _lag_free(pair.slope))
+    words = f"the track turns {pair.slope:.3g} times as far as {one.headers['psi']}"
+    remedy = f'state the right unit in trial.toml: [channels] "{one.headers["psi"]}" = "psi [UNIT]", or that of the track'
+    check = "unit_slip" if slip else "track_against_heading"
+    more = f": off by {slip[0]:.4g}, {slip[1]}" if slip else ""
+    return [_finding(one, check, ("psi", "north", "east"), pair.worst, words + more, remedy)]
+
+
+def _lag_free(slope: float) -> float:
+    """Drift makes a track turn somewhat less or more than the heading; a unit slip is told all the same."""
+    for value in (57.29578, 1.0 / 57.29578):
+        if 0.6 < slope / value < 1.6:
+            return slope / value
+    return 1.0
+
+
+def _speed_ratio(one: Recording, name: str, ratio: float, at: float) -> list[Finding]:
+    header = one.headers[name]
+    words = f"the track runs at {ratio:.4g} of the speed in {header}"
+    slip = factor_between(ratio)
+    if slip and abs(ratio - 1.0) > 0.25:
+        remedy = f'state the right unit in trial.toml: [channels] "{header}" = "{name} [UNIT]", or that of the track'
+        return [_finding(one, "unit_slip", (name, "north", "east"), at, f"{words}: {slip[1]} exchanged", remedy)]
+    if abs(ratio - 1.0) > 0.25:
+        remedy = "look at units and scale of track and speed; the two cannot both be right"
+        return [_finding(one, "track_against_speed", (name, "north", "east"), at, words, remedy)]
+    if abs(ratio - 1.0) > 0.05:
+        remedy = "a current, or a log that is off; [current] in trial.toml takes a current off the track"
+        return [_finding(one, "track_against_speed", (name, "north", "east"), at, words, remedy, "warning")]
+    return []
+
+
+def check_recording(one: Recording) -> list[Finding]:
+    """Everything about a recording that two of its channels tell one another.
+
+    Parameters
+    ----------
+    one : In program axes.
+
+    Returns
+    -------
+    Findings with file, row, columns and remedy.
+    """
+    angles = [a for a in ("psi", "phi", "theta", "u") if a in one.channels and len(one.channels[a]) >= 8]
+    slopes = {a: path_of(one.channels[a]) for a in angles}
+    return [*_rates(one, slopes), *_track(one)]
+
+
+def refused(one: Recording, findings: list[Finding], uses_track: bool, heading_sure: bool) -> None:
+    """Refuse a record whose numbers would be wrong.
+
+    Parameters
+    ----------
+    uses_track : The metrics are read off the track.
+    heading_sure : The heading is borne out by rudder or track; a rate that is off then is off alone.
+
+    Raises
+    ------
+    InputError
+        Naming file, row and columns of the first finding that decides a number, with its remedy.
+    """
+    for finding in findings:
+        track = finding.check.startswith("track") or "north" in finding.what or "track" in finding.what
+        if finding.check == "exchanged_channels":
+            break
+        if finding.severity == "error" and track and uses_track:
+            break
+        if finding.severity == "error" and not track and not heading_sure:
+            break
+    else:
+        return
+    place = f"{one.file}, row {finding.shown_rows}, column{'s' if len(finding.columns) > 1 else ''} {', '.join(finding.columns)}"
+    raise InputError(place, finding.what, finding.remedy)

@@ -1,0 +1,231 @@
+"""Which maneuver a record holds: stated, or found from rudder or planes, heading, pitch and heel."""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ident.timeseries.smoothing import Samples, SmoothPath, smooth
+from ident.trials.reading import Recording
+from sim.files.errors import InputError
+from sim.files.record import Record
+
+Array = NDArray[np.float64]
+KINDS = (
+    "zigzag",
+    "vertical_zigzag",
+    "turning_circle",
+    "direct_spiral",
+    "pull_out",
+    "stopping",
+    "roll_decay",
+    "rise",
+    "depth_change",
+    "course_keeping",
+)
+_ALLOWED = "zigzag 20/20, vertical_zigzag 10/10, turning_circle 35, " + ", ".join(KINDS[3:])
+# Check angles in use, and how far after the reversal its effect is seen in the heading.
+_CHECKS = (1.0, 2.0, 3.0, 5.0, 7.0, 10.0, 15.0, 20.0, 25.0, 30.0, 35.0)
+_NOTICE = math.radians(0.3)
+
+
+@dataclass(frozen=True)
+class Maneuver:
+    """A maneuver with its angles [deg].
+
+    Attributes
+    ----------
+    kind : One of ``KINDS``.
+    planes : Angle of rudder or planes, without sign; None where not known.
+    check : Check angle of a zigzag.
+    """
+
+    kind: str
+    planes: float | None = None
+    check: float | None = None
+
+    @property
+    def horizontal(self) -> bool:
+        """Whether rudder and heading make it."""
+        return self.kind in ("zigzag", "turning_circle", "direct_spiral", "pull_out", "stopping", "course_keeping")
+
+    def __str__(self) -> str:
+        if self.check is not None:
+            planes = f"{self.planes:g}" if self.planes is not None else "?"
+            return f"{self.kind} {planes}/{self.check:g}"
+        return self.kind if self.planes is None else f"{self.kind} {self.planes:g}"
+
+
+def stated(text: str) -> Maneuver:
+    """A maneuver from words such as ``zigzag 20/20``, ``turning circle 35``, ``10/10 vertical zig-zag``.
+
+    Raises
+    ------
+    InputError
+        For words that name none, or a zigzag without its angles.
+    """
+    low = re.sub(r"[\s_-]+", " ", text.strip().lower()).replace("zig zag", "zigzag")
+    angles = re.search(r"(\d+(?:\.\d+)?)\s*/\s*(\d+(?:\.\d+)?)", low)
+    single = re.search(r"(\d+(?:\.\d+)?)", low)
+    if "zigzag" in low or re.search(r"\b(zz|hzz|vzz)\b", low):
+        if not angles:
+            raise InputError("maneuver", repr(text), "a zigzag with rudder and check angle: zigzag 20/20")
+        kind = "vertical_zigzag" if "vert" in low or "vzz" in low or "depth" in low else "zigzag"
+        return Maneuver(kind, float(angles[1]), float(angles[2]))
+    words = {"turn": "turning_circle", "spiral": "direct_spiral", "pull": "pull_out", "stop": "stopping"}
+    words |= {"roll": "roll_decay", "rise": "rise", "max q": "rise", "surfac": "rise", "depth": "depth_change"}
+    words |= {"course keep": "course_keeping", "heading keep": "course_keeping"}
+    kind = next((k for word, k in words.items() if word in low), "")
+    if not kind:
+        raise InputError("maneuver", repr(text), _ALLOWED)
+    return Maneuver(kind, float(single[1]) if single and kind in ("turning_circle", "rise") else None)
+
+
+@dataclass(frozen=True)
+class Hold:
+    """A stretch over which rudder or planes stay at one angle [rad]."""
+
+    start: float
+    end: float
+    value: float
+    before: float
+
+
+def holds(record: Record) -> list[Hold]:
+    """The stretches over which a control stays where it is, of three samples or more."""
+    t, x = record.abscissa, record.value
+    spread = float(np.percentile(x, 98) - np.percentile(x, 2))
+    tolerance = max(0.04 * spread, 4.0 * 1.4826 * float(np.median(np.abs(np.diff(x)))), math.radians(0.2))
+    out: list[Hold] = []
+    start = 0
+    for i in range(1, len(x) + 1):
+        if i < len(x) and abs(x[i] - float(np.median(x[max(start, i - 50) : i]))) <= tolerance:
+            continue
+        if i - start >= 3 or i == len(x) > start:
+            value = float(np.median(x[start:i]))
+            before = float(t[start - 1]) if start else float(t[0])
+            # A plateau, not a piece of a ramp: most of it lies within a third of the tolerance.
+            if i - start >= 3 and abs(float(x[i - 1] - x[start])) < tolerance:
+                out.append(Hold(float(t[start]), float(t[i - 1]), value, before))
+        start = i
+    return out
+
+
+def control_of(one: Recording, vertical: bool = False) -> Record | None:
+    """Record of what steers the maneuver: the order where it is recorded, else the angle."""
+    names = ("dV",) if vertical else ("dH_order", "dH")
+    return next((one.channels[n] for n in names if n in one.channels), None)
+
+
+def _by_control(one: Recording, angle: Record, control: Record, vertical: bool) -> Maneuver | None:
+    levels = holds(control)
+    used = [h for h in levels if abs(h.value) > math.radians(0.5)]
+    if not used:
+        return None
+    base = float(np.median(angle.value[angle.abscissa <= used[0].start + 1e-9][-20:])) if used[0].start > 0 else float(angle.value[0])
+    turned = angle.value - base
+    signs = [math.copysign(1.0, h.value) for h in used]
+    planes = round(math.degrees(float(np.median([abs(h.value) for h in used]))) * 2.0) / 2.0
+    alternating = len(used) >= 2 and all(a != b for a, b in zip(signs, signs[1:], strict=False))
+    if alternating and np.ptp(turned) < math.radians(170.0) and len(used) == len([h for h in used if abs(abs(math.degrees(h.value)) - planes) < 0.2 * planes]):
+        at = [abs(float(angle.at(0.5 * (h.start + h.before)) - base)) for h in used[1:]]
+        check = round(math.degrees(float(np.median(at))))
+        near = min(_CHECKS, key=lambda c: abs(c - math.degrees(float(np.median(at)))))
+        check = near if abs(near - math.degrees(float(np.median(at)))) < max(1.0, 0.08 * near) else check
+        return Maneuver("vertical_zigzag" if vertical else "zigzag", planes, float(check))
+    if vertical:
+        return None
+    values = {round(math.degrees(h.value)) for h in levels}
+    if len(values) >= 5:
+        return Maneuver("direct_spiral")
+    if len(used) < len(levels) and any(abs(h.value) <= math.radians(0.5) and h.start > used[0].start for h in levels):
+        return Maneuver("pull_out")
+    if len(used) == 1 and abs(turned[-1]) > math.radians(120.0):
+        return Maneuver("turning_circle", planes)
+    return None
+
+
+def reversal_angle(t: Array, path: SmoothPath, base: float) -> tuple[float, list[float]]:
+    """Check angle of a zigzag [deg], from where the heading alone shows that the rudder was reversed.
+
+    Parameters
+    ----------
+    t : Times of the record [s].
+    path : Its heading.
+    base : Course at the start [rad].
+
+    Returns
+    -------
+    The angle in use next below, and the angles [deg] at which the yaw began to slow down.
+    """
+    grid = np.linspace(t[0], t[-1], 4000)
+    x, rate, acceleration = path(grid) - base, path(grid, 1), path(grid, 2)
+    turns = np.flatnonzero(rate[:-1] * rate[1:] < 0.0)
+    ends = [i for i in turns if abs(x[i]) > 0.25 * float(np.max(np.abs(x)))]
+    seen = []
+    for before, end in zip([0, *ends], ends, strict=False):
+        if end - before < 20:
+            continue
+        sense = math.copysign(1.0, x[end])
+        slowing = sense * acceleration[before : end + 1]
+        bottom = int(np.argmin(slowing))
+        fell = np.flatnonzero(slowing[:bottom] > 0.25 * slowing[bottom])
+        if fell.size:
+            seen.append(math.degrees(sense * float(x[before + fell[-1]])))
+    if not seen:
+        return math.nan, []
+    lowest = float(np.median(seen)) + math.degrees(_NOTICE)
+    return max((c for c in _CHECKS if c <= lowest), default=math.nan), seen
+
+
+def _by_angle(one: Recording, name: str) -> tuple[Maneuver, str] | None:
+    """A turn or a zigzag, from heading or pitch alone."""
+    record = one.channels[name]
+    path = smooth([Samples(record.abscissa, record.value, 0, 0.0)])
+    base = float(path(record.abscissa[0]))
+    turned = path(record.abscissa) - base
+    if name == "psi" and abs(turned[-1]) > math.radians(120.0) and abs(turned[-1]) > 0.9 * float(np.max(np.abs(turned))):
+        return Maneuver("turning_circle"), "turning circle: the heading turns on to one side"
+    high, low = float(turned.max()), float(turned.min())
+    if min(high, -low) < math.radians(0.5) or min(high, -low) < 0.25 * max(high, -low):
+        return None
+    check, seen = reversal_angle(record.abscissa, path, base)
+    if math.isnan(check):
+        return None
+    kind = "zigzag" if name == "psi" else "vertical_zigzag"
+    shown = ", ".join(f"{s:.1f}" for s in seen)
+    control = "rudder" if name == "psi" else "plane"
+    text = f"{kind} with check angle {check:g} deg: no {control} in the record; {'yaw' if name == 'psi' else 'pitch'} begins to slow down at {shown} deg. State it if it is another: --maneuver \"zigzag D/C\""
+    return Maneuver(kind, None, check), text
+
+
+def maneuver_of(one: Recording, text: str) -> tuple[Maneuver, str]:
+    """The maneuver of a record, and by what it is known.
+
+    Raises
+    ------
+    InputError
+        When it is not stated and cannot be found.
+    """
+    if text:
+        return stated(text), f"maneuver {text}: stated"
+    for angle, vertical in (("psi", False), ("theta", True)):
+        control = control_of(one, vertical)
+        if angle in one.channels and control is not None:
+            known = _by_control(one, one.channels[angle], control, vertical)
+            if known:
+                by = one.headers[control.channel]
+                return known, f"maneuver {known}: found from {by} and {one.headers[angle]}"
+    for angle in ("psi", "theta"):
+        by_angle = _by_angle(one, angle) if angle in one.channels else None
+        if by_angle:
+            return by_angle[0], "maneuver: " + by_angle[1]
+    if "psi" not in one.channels and "north" in one.channels:
+        return Maneuver("turning_circle"), "turning circle: a track without heading"
+    if "phi" in one.channels and not {"psi", "theta"} & set(one.channels):
+        return Maneuver("roll_decay"), "roll decay: heel is the only angle"
+    raise InputError(one.file, "a record that shows no maneuver", f"--maneuver, or maneuver in trial.toml: {_ALLOWED}")

@@ -1,0 +1,244 @@
+"""A record of a maneuver as the recorder wrote it: wide or long tables, any reader of a campaign."""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ident.captive.quantities import is_unit
+from ident.captive.readers.opening import open_sheet, reader_of
+from ident.captive.readers.table import Sheet
+from ident.captive.readers.text import COMMENTS, head
+from ident.captive.source import Source
+from ident.checks.findings import Finding
+from ident.trials.channels import Meaning, channel_of, meaning, plain
+from ident.trials.spec import TrialFile
+from ident.trials.times import parsed, stamps
+from sim.files.errors import InputError
+from sim.files.record import Record
+
+Array = NDArray[np.float64]
+_MOST_ROWS = 2_000_000
+_LONG = ("channel", "value", "unit")
+_TIMES = ("t", "time", "time s", "t s")
+_BLANK = ("", "nan", "na", "n/a", "-", "--", "null", "none", "inf")
+
+
+@dataclass(frozen=True)
+class Recording:
+    """A trial as read: SI, on its own clock from the first row.
+
+    Attributes
+    ----------
+    file : The file.
+    channels : Records by channel.
+    headers : Channel -> header of its column.
+    rows : File row of each time of the record, for findings: (times, rows).
+    time_sigma : Standard error of the stamps [s].
+    zero : First stamp as it stands, where it is a number of seconds; zero for times of day.
+    assumed : What was found or taken for granted.
+    findings : What is wrong with it.
+    """
+
+    file: str
+    channels: dict[str, Record]
+    headers: dict[str, str]
+    rows: tuple[Array, NDArray[np.int64]]
+    time_sigma: float
+    assumed: tuple[str, ...]
+    findings: tuple[Finding, ...] = field(default=())
+    zero: float = 0.0
+
+    def row_at(self, time: float) -> int:
+        """File row of the sample nearest a time."""
+        return int(self.rows[1][int(np.argmin(np.abs(self.rows[0] - time)))])
+
+    def with_(self, **changes: object) -> Recording:
+        """The same with some fields changed."""
+        return replace(self, **changes)  # type: ignore[arg-type]
+
+
+def _source(path: Path, spec: TrialFile) -> Source:
+    """How the file is to be opened; a header in front of white-space columns is found."""
+    given = {k: getattr(spec, k) for k in ("delimiter", "decimal", "encoding", "header_pattern", "skip", "units_row")}
+    source = Source(files=path.name, **given)
+    if spec.header_pattern or reader_of(path, source) != "columns":
+        return source
+    first = head(path, source.encoding, (), source.skip)
+    named = [t for t in first.text if sum(bool(channel_of(w)) for w in re.split(r"[\s\[\](),;]+", t)) >= 2]
+    if not named:
+        allowed = "a header with the names of the columns, or header_pattern in trial.toml"
+        raise InputError(str(path), "columns without a header that names channels", allowed)
+    return source.model_copy(update={"header_pattern": "^" + re.escape(named[-1]) + "$"})
+
+
+def _cells(sheet: Sheet) -> tuple[list[int], list[list[str]]]:
+    rows: list[int] = []
+    cells: list[list[str]] = []
+    for row, one in sheet.cells():
+        rows.append(row)
+        cells.append(one)
+        if len(rows) > _MOST_ROWS:
+            raise InputError(f"{sheet.path}, row {row}", "more rows", f"at most {_MOST_ROWS} of one maneuver")
+    if len(rows) < 2:
+        raise InputError(str(sheet.path), f"{len(rows)} rows below the header", "a record of two rows or more")
+    return rows, cells
+
+
+def _units_below(sheet: Sheet, cells: list[list[str]]) -> list[str] | None:
+    """The first row where it holds units and no number: headers with them; None where it does not."""
+    first = cells[0]
+    if any(sheet.dialect.number(c) is not None or parsed(c, None) is not None for c in first) or not any(first):
+        return None
+    units = [c.strip("[]() ") for c in first]
+    if not all(u in ("", "-") or is_unit(u) or is_unit(u.lower()) for u in units):
+        return None
+    return [h if u in ("", "-") else f"{h} [{u}]" for h, u in zip(sheet.header, units, strict=True)]
+
+
+def read_recording(path: Path, spec: TrialFile) -> Recording:
+    """Read a record of a maneuver.
+
+    Parameters
+    ----------
+    path : Any table a campaign reads: CSV with any delimiter and decimal mark, columns, Parquet.
+        Wide, a column a channel; or long, with the columns channel, t, value, unit.
+    spec : What the file does not say.
+
+    Raises
+    ------
+    InputError
+        For a file that cannot be read, without time or channel, or with a unit missing.
+    """
+    if not path.is_file():
+        raise InputError(str(path), "no such file", "a table with a time column and a column a channel")
+    sheet = open_sheet(path, _source(path, spec))
+    rows, cells = _cells(sheet)
+    header, said = list(sheet.header), []
+    below = _units_below(sheet, cells)
+    if below:
+        header, rows, cells = below, rows[1:], cells[1:]
+        said.append(f"row {sheet.first_row}: units of the columns")
+    if all(word in [plain(h) for h in header] for word in _LONG):
+        return _long(sheet, header, rows, cells, spec, said)
+    return _wide(sheet, header, rows, cells, spec, said)
+
+
+def _meanings(sheet: Sheet, header: list[str], spec: TrialFile, said: list[str]) -> list[Meaning | None]:
+    for key in spec.channels:
+        if key not in header and key not in [h.partition(" [")[0] for h in header]:
+            raise InputError(f"{sheet.path}, key channels", f"no column {key!r}", ", ".join(header)[:200])
+    found = [
+        meaning(h, spec.channels.get(h, spec.channels.get(h.partition(" [")[0])), sheet.where) for h in header
+    ]
+    for one in (f for f in found if f is not None):
+        twice = [f.header for f in found if f is not None and f.channel == one.channel]
+        if len(twice) > 1:
+            text = f'one column a channel; leave one out in trial.toml: [channels] "{twice[1]}" = "-"'
+            raise InputError(sheet.where, f"{' and '.join(map(repr, twice))} both hold {one.channel}", text)
+        if one.assumed:
+            said.append(one.assumed)
+    unused = [h for h, f in zip(header, found, strict=True) if f is None and h not in sheet.spacers]
+    if unused:
+        said.append(f"columns not used: {', '.join(unused)[:200]}")
+    return found
+
+
+def _wide(
+    sheet: Sheet, header: list[str], rows: list[int], cells: list[list[str]], spec: TrialFile, said: list[str]
+) -> Recording:
+    found = _meanings(sheet, header, spec, said)
+    clock = next((i for i, f in enumerate(found) if f is not None and f.channel == "t"), None)
+    if clock is None:
+        text = 'a column of time (t [s], time, UTC), or trial.toml: [channels] "NAME" = "t [s]"'
+        raise InputError(sheet.where, f"no time among {', '.join(header)[:160]}", text)
+    one = found[clock]
+    assert one is not None
+    raw = [parsed(c[clock], sheet.dialect.number(c[clock])) for c in cells]
+    bad = next((i for i, v in enumerate(raw) if v is None or not math.isfinite(v)), None)
+    if bad is not None:
+        place = f"{sheet.path}, row {rows[bad]}, column {one.header}"
+        raise InputError(place, repr(cells[bad][clock][:40]), "seconds, hh:mm:ss, or an ISO date and time")
+    as_clock = sheet.dialect.number(cells[0][clock]) is None
+    times = stamps(
+        [c[clock] for c in cells], np.array(raw, dtype=float), 1.0 if as_clock else one.factor, str(sheet.path), rows, one.header
+    )
+    said += times.said
+    zero = 0.0 if as_clock else float(raw[0] or 0.0) * one.factor
+    channels, headers = {}, {"t": one.header}
+    for i, what in enumerate(found):
+        if what is None or i == clock:
+            continue
+        value = _numbers(sheet, rows, cells, i, what)
+        kept = np.isfinite(value)
+        if kept.sum() >= 2:
+            channels[what.channel] = Record(what.channel, times.time[kept], value[kept] * what.factor, what.unit)
+            headers[what.channel] = what.header
+    if not channels:
+        raise InputError(sheet.where, f"no channel among {', '.join(header)[:160]}", "a heading, pitch, heel or track")
+    return Recording(
+        str(sheet.path), channels, headers, (times.time, np.array(rows)), times.sigma, tuple(said), times.findings, zero
+    )
+
+
+def _numbers(sheet: Sheet, rows: list[int], cells: list[list[str]], column: int, what: Meaning) -> Array:
+    """A column as numbers; NaN where a cell is blank."""
+    out = np.full(len(cells), np.nan)
+    for k, one in enumerate(cells):
+        value = sheet.dialect.number(one[column])
+        if value is not None:
+            out[k] = value
+        elif one[column].strip().lower() not in _BLANK:
+            place = f"{sheet.path}, row {rows[k]}, column {what.header}"
+            raise InputError(place, repr(one[column][:40]), "a finite number, or nothing where there is no sample")
+    return out
+
+
+def _long(
+    sheet: Sheet, header: list[str], rows: list[int], cells: list[list[str]], spec: TrialFile, said: list[str]
+) -> Recording:
+    """A table of one row a sample: channel, t, value, unit."""
+    words = [plain(h) for h in header]
+    at = {name: words.index(name) for name in _LONG}
+    clock = next((i for i, w in enumerate(words) if w in _TIMES or channel_of(w) == "t"), None)
+    if clock is None:
+        raise InputError(sheet.where, f"no time among {', '.join(header)[:160]}", "a column t or time [s]")
+    named = words.index("source") if "source" in words else None
+    sources = list(dict.fromkeys(c[named] for c in cells)) if named is not None else []
+    if len(sources) > 1:
+        raise InputError(f"{sheet.path}, column source", f"{len(sources)} sources: {', '.join(sources)[:120]}", "one trial a file")
+    channels, headers, findings = {}, {"t": header[clock]}, []
+    everything: list[tuple[Array, list[int]]] = []
+    for name in dict.fromkeys(c[at["channel"]] for c in cells):
+        mine = [i for i, c in enumerate(cells) if c[at["channel"]] == name]
+        unit = cells[mine[0]][at["unit"]]
+        what = meaning(f"{name} [{unit}]", spec.channels.get(name), f"{sheet.path}, row {rows[mine[0]]}")
+        if what is None:
+            said.append(f"channel not used: {name}")
+            continue
+        place = [rows[i] for i in mine]
+        raw = [parsed(cells[i][clock], sheet.dialect.number(cells[i][clock])) for i in mine]
+        bad = next((i for i, v in enumerate(raw) if v is None), None)
+        if bad is not None:
+            raise InputError(f"{sheet.path}, row {place[bad]}, column {header[clock]}", repr(cells[mine[bad]][clock]), "a time")
+        first = np.array(raw, dtype=float)
+        times = stamps([cells[i][clock] for i in mine], first, 1.0, str(sheet.path), place, header[clock])
+        value = _numbers(sheet, place, [cells[i] for i in mine], at["value"], what)
+        kept = np.isfinite(value)
+        channels[what.channel] = Record(what.channel, (times.time + first[0])[kept], value[kept] * what.factor, what.unit)
+        headers[what.channel] = name
+        said += [s for s in times.said if s not in said]
+        findings += list(times.findings)
+        everything.append((times.time + first[0], place))
+    if not channels:
+        raise InputError(f"{sheet.path}, column channel", "no channel that is known", "psi, r, u, x, y, ...")
+    zero = min(float(r.abscissa[0]) for r in channels.values())
+    channels = {k: r.moved(zero) for k, r in channels.items()}
+    stamps_of = max(everything, key=lambda e: e[0].size)
+    rows_of = (stamps_of[0] - zero, np.array(stamps_of[1]))
+    return Recording(str(sheet.path), channels, headers, rows_of, 0.0, tuple(said), tuple(findings), zero)

@@ -1,0 +1,125 @@
+"""``ident trial``: a recorded maneuver, measured alone."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ident.checks.findings import Finding
+from ident.timeseries.smoothing import SmoothPath
+from ident.trials.alignment import Start, paths, start_of
+from ident.trials.consistency import check_recording, refused
+from ident.trials.earth import in_program_axes
+from ident.trials.maneuvers import Maneuver, control_of, maneuver_of
+from ident.trials.measure import DRAWS, Value, measured
+from ident.trials.reading import Recording, read_recording
+from ident.trials.spec import TrialFile
+from ident.trials.spikes import without_spikes
+from sim.files.errors import InputError
+
+# A zigzag has its check angle at this share of the plane angle or more, and swings by less than this [deg].
+_LEAST_CHECK, _MOST_SWING = 0.1, 150.0
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A measured trial.
+
+    Attributes
+    ----------
+    recording : In program axes, full scale.
+    spec : What was stated.
+    maneuver, start : What was done, and when it began.
+    paths : Smooth path of each channel.
+    metrics : Name -> value, standard error, unit.
+    assumed : What was found or taken for granted.
+    findings : What is wrong with the record.
+    """
+
+    recording: Recording
+    spec: TrialFile
+    maneuver: Maneuver
+    start: Start
+    paths: dict[str, SmoothPath]
+    metrics: dict[str, Value]
+    assumed: tuple[str, ...]
+    findings: tuple[Finding, ...]
+
+    def to_dict(self) -> dict[str, Any]:
+        """For a machine to read."""
+        return {
+            "maneuver": str(self.maneuver),
+            "file": self.recording.file,
+            "assumed": list(self.assumed),
+            "metrics": {name: value.to_dict() for name, value in self.metrics.items()},
+            "findings": [f.as_json() for f in self.findings],
+        }
+
+
+def _borne_out(one: Recording, maneuver: Maneuver, findings: list[Finding]) -> bool:
+    """Whether rudder or track say that the angle measured on has the right size."""
+    headings = {one.headers.get("psi", "")}
+    if any(f.check in ("unit_slip", "track_against_heading") and "track" in f.what and headings & set(f.columns) for f in findings):
+        return False
+    by_control = control_of(one, maneuver.kind == "vertical_zigzag") is not None
+    plausible = maneuver.check is None or maneuver.planes is None or maneuver.check >= _LEAST_CHECK * maneuver.planes
+    return (by_control and plausible) or "north" in one.channels
+
+
+def _swings(trial: Trial) -> None:
+    """Refuse a zigzag that no boat makes, or that never comes to its check angle."""
+    if "zigzag" not in trial.maneuver.kind:
+        return
+    name = "psi" if trial.maneuver.kind == "zigzag" else "theta"
+    record, header = trial.recording.channels[name], trial.recording.headers[name]
+    size = math.degrees(float(np.max(np.abs(record.value - float(trial.paths[name](trial.start.time))))))
+    place = f"{trial.recording.file}, column {header}"
+    remedy = f'the unit of {header} (degrees and radians?), the maneuver, or execute_s; [channels] in trial.toml states a unit'
+    if size > _MOST_SWING:
+        raise InputError(place, f"a zigzag that swings by {size:.4g} deg", remedy)
+    if "execute_2_s" not in trial.metrics:
+        check = f"{trial.maneuver.check:g} deg, the check angle of {trial.maneuver}"
+        raise InputError(place, f"{size:.3g} deg at most, which never comes to {check}", remedy)
+
+
+def measure_trial(path: Path, spec: TrialFile | None = None, count: int = DRAWS) -> Trial:
+    """Read, check, align and measure one recorded maneuver.
+
+    Parameters
+    ----------
+    path : The record.
+    spec : What it does not say of itself.
+    count : Draws from the posterior of the paths, for the standard errors.
+
+    Raises
+    ------
+    InputError
+        For a file that cannot be read, a record that contradicts itself where the numbers would be
+        wrong, or a maneuver that is neither stated nor found.
+
+    Examples
+    --------
+    >>> from ident.trials.trial import measure_trial
+    >>> measure_trial(Path("zigzag.csv")).metrics["overshoot_1_deg"]  # doctest: +SKIP
+    Value(value=11.42, sigma=0.03, unit='deg')
+    """
+    spec = spec or TrialFile()
+    one = in_program_axes(without_spikes(read_recording(path, spec)), spec)
+    findings = [*one.findings, *check_recording(one)]
+    # Exchanged channels would be taken for a maneuver that was not made.
+    refused(one, [f for f in findings if f.check == "exchanged_channels"], True, True)
+    maneuver, by = maneuver_of(one, spec.maneuver)
+    track = maneuver.kind in ("turning_circle", "stopping")
+    sure = _borne_out(one, maneuver, findings)
+    refused(one, findings, track, sure)
+    start = start_of(one, maneuver, spec)
+    found, taken = paths(one, start, spec)
+    metrics = measured(one, maneuver, start, found, spec, count)
+    said = (*one.assumed, by, *start.said, *taken)
+    done = Trial(one, spec, maneuver, start, found, metrics, said, tuple(findings))
+    _swings(done)
+    return done
