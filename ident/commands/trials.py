@@ -15,7 +15,9 @@ from ident.commands.shared import console_for, emit, json_to, out_file
 @click.option("--spec", type=click.Path(path_type=Path), default=None, help="trial.toml: what the record does not say.")
 @click.option("--maneuver", default="", help='As "zigzag 20/20" or "turning_circle 35", instead of the spec\'s.')
 @click.option("--scale", type=click.FloatRange(min=0, min_open=True), default=None, help="Full scale over model scale.")
-@click.option("--length", "length", type=click.FloatRange(min=0, min_open=True), default=None, help="L [m], full scale.")
+@click.option(
+    "--length", "length", type=click.FloatRange(min=0, min_open=True), default=None, help="L [m], full scale."
+)
 @click.option("--figures", type=click.Path(path_type=Path), default=None, help="Folder for the plots of the report.")
 @out_file("Write the metrics as CSV.")
 @json_to("Write maneuver, assumptions, metrics with standard errors and findings.")

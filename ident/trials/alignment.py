@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ident.timeseries.smoothing import Samples, SmoothPath, smooth
 from ident.trials.consistency import path_of, regressed
-from ident.trials.maneuvers import Maneuver, control_of, holds
+from ident.trials.maneuvers import Maneuver, control_of, holds, large
 from ident.trials.reading import Recording
 from ident.trials.spec import TrialFile
 from sim.files.errors import InputError
@@ -58,9 +58,9 @@ def stated_noise(spec: TrialFile, channel: str) -> float:
 def _of_control(one: Recording, control: Record) -> tuple[float, float, str] | None:
     """Execute by the first step of the rudder or planes, or of the revolutions."""
     levels = holds(control)
-    first = next((h for h in levels if abs(h.value) > math.radians(0.5)), None)
-    if first is None:
+    if not (used := large(levels)):
         return None
+    first = used[0]
     header = one.headers[control.channel]
     t, x = control.abscissa, control.value
     if first.start <= t[0] + 1e-9:
@@ -69,11 +69,17 @@ def _of_control(one: Recording, control: Record) -> tuple[float, float, str] | N
     base = quiet[-1].value if quiet else 0.0
     step = first.value - base
     share = (x - base) / step
-    moving = np.flatnonzero((t <= first.start + 1e-9) & (share > 0.1) & (share < 0.9) & (t > (quiet[-1].end if quiet else t[0])))
+    moving = np.flatnonzero(
+        (t <= first.start + 1e-9) & (share > 0.1) & (share < 0.9) & (t > (quiet[-1].end if quiet else t[0]))
+    )
     if moving.size >= 2:
         slope, offset = np.polyfit(t[moving], share[moving], 1)
         start = float(-offset / slope)
-        return start, float(np.median(np.diff(t))) / math.sqrt(12.0), f"execute at {start:.2f} s, where {header} begins to move"
+        return (
+            start,
+            float(np.median(np.diff(t))) / math.sqrt(12.0),
+            f"execute at {start:.2f} s, where {header} begins to move",
+        )
     after = int(np.argmax((share > 0.5) & (t > (quiet[-1].end if quiet else t[0]) - 1e-9)))
     before, now = float(t[max(after - 1, 0)]), float(t[after])
     text = f"execute between {before:.2f} and {now:.2f} s, where {header} leaves {math.degrees(base):.1f} deg"
@@ -96,9 +102,13 @@ def _onset(record: Record, path: SmoothPath) -> tuple[float, float, str]:
     starts = [(4.0 ** (1.0 / k) * first - second) / (4.0 ** (1.0 / k) - 1.0) for k in (2.0, 3.0)]
     start, sigma = 0.5 * sum(starts), abs(starts[1] - starts[0]) / 2.0
     if start - t[0] <= max(2.0 * sigma, 3.0 * float(np.median(np.diff(t))), 0.1 * (second - t[0])):
-        return float(t[0]), 0.0, "execute at the first sample: the boat begins to turn with the record; no rudder is recorded"
-    text = f"execute at {start:.1f} s +- {sigma:.1f} s, from when the boat begins to turn; no rudder is recorded: execute_s states it"
-    return start, sigma, text
+        return (
+            float(t[0]),
+            0.0,
+            "execute at the first sample: the boat begins to turn with the record; no rudder is recorded",
+        )
+    text = f"execute at {start:.1f} s +- {sigma:.1f} s, from when the boat begins to turn"
+    return start, sigma, text + "; no rudder is recorded: execute_s states it"
 
 
 def _approach(record: Record, until: float, sigma: float) -> tuple[float, float, str] | None:
@@ -182,7 +192,7 @@ def paths(one: Recording, start: Start, spec: TrialFile) -> tuple[dict[str, Smoo
     found: dict[str, SmoothPath] = {}
     said: list[str] = []
     for name, record in one.channels.items():
-        if name in ("dH", "dV", "dH_order", "course", "p", "q", "r", "udot"):
+        if name in ("dH", "dV", "dH_order", "course", "p", "q", "r", "udot", "n", "v", "w"):
             continue
         samples, path = _from_run_up(record, start.time, stated_noise(spec, name))
         if path is None:
@@ -206,7 +216,7 @@ def _from_run_up(record: Record, execute: float, noise: float) -> tuple[list[Sam
     best: tuple[list[Samples], SmoothPath | None] = ([], None)
     for run_up in (1.01 * step, _RUN_UP_S):
         inside = record.kept(record.abscissa >= execute - run_up - 1e-9)
-        if len(inside) < 8:
+        if len(inside) < 8 or (best[0] and len(inside) == best[0][0].time.size):
             continue
         samples = [Samples(inside.abscissa, inside.value, 0, noise)]
         path = smooth(samples)

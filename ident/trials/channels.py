@@ -75,14 +75,11 @@ def _split(header: str) -> tuple[str, str | None]:
         return name, unit
     if channel_of(header):
         return header, _NAMED_UNIT.get(plain(header).split()[-1])
-    parts = re.split(r"\s*[/,]\s*|[\s_]+", header.strip(), maxsplit=0)
-    for k in range(len(parts) - 1, 0, -1):
-        at = len(header.strip()) - len(re.split(r"(?<=\S)(?=[\s_/,])", header.strip())[-1])
-        head, tail = header.strip()[:at].strip(" _/,"), header.strip()[at:].strip(" _/,")
-        channel = channel_of(head)
-        if channel and unit_factor(channel, tail) is not None:
-            return head, tail
-        break
+    found = re.fullmatch(r"(.*\S)\s*[\s_/,]\s*(\S+)", header.strip())
+    if found:
+        channel = channel_of(found[1].rstrip(" _/,"))
+        if channel and unit_factor(channel, found[2]) is not None:
+            return found[1].rstrip(" _/,"), found[2]
     return header, None
 
 
@@ -120,7 +117,9 @@ def _with_unit(header: str, channel: str, unit: str | None, place: str) -> Meani
     row = table().loc[channel]
     if unit is None or unit == "":
         if not row["default"]:
-            allowed = f"a unit in the header, {header} [{_example(channel)}], or in trial.toml: [channels] {header!r} = "
+            allowed = (
+                f"a unit in the header, {header} [{_example(channel)}], or in trial.toml: [channels] {header!r} = "
+            )
             raise InputError(place, f"no unit for {channel}", allowed + f'"{channel} [{_example(channel)}]"')
         unit, said = str(row["default"]), f"{header}: no unit in the header, taken as {row['default']}"
     else:
@@ -135,4 +134,6 @@ def _with_unit(header: str, channel: str, unit: str | None, place: str) -> Meani
 
 
 def _example(channel: str) -> str:
-    return {"rad": "deg", "rad/s": "deg/s", "1/s": "rpm"}.get(str(table().loc[channel, "unit"]), str(table().loc[channel, "unit"]))
+    return {"rad": "deg", "rad/s": "deg/s", "1/s": "rpm"}.get(
+        str(table().loc[channel, "unit"]), str(table().loc[channel, "unit"])
+    )

@@ -79,7 +79,9 @@ def path_of(record: Record) -> SmoothPath:
     return smooth([Samples(record.abscissa, record.value, 0, 0.0)])
 
 
-def _finding(one: Recording, check: str, columns: tuple[str, ...], at: float, what: str, remedy: str, severity: str = "error") -> Finding:
+def _finding(
+    one: Recording, check: str, columns: tuple[str, ...], at: float, what: str, remedy: str, severity: str = "error"
+) -> Finding:
     headers = tuple(one.headers.get(c, c) for c in columns)
     return Finding(check, severity, one.file, (one.row_at(at),), headers, what, remedy)
 
@@ -123,14 +125,23 @@ def _of_rate(one: Recording, name: str, pairs: dict[str, Pair]) -> list[Finding]
         return [_finding(one, "exchanged_channels", (name, angle), pair.worst, what, remedy)]
     if own is None or own.agrees:
         return []
-    words = f"{header} against the rate of {one.headers[RATES[name]]}: slope {own.slope:.4g}, correlation {own.correlation:.3f}"
+    words = f"{header} against the rate of {one.headers[RATES[name]]}: "
+    words += f"slope {own.slope:.4g}, correlation {own.correlation:.3f}"
     slip = factor_between(own.slope) if abs(own.correlation) > _ALIKE else None
     if slip:
         remedy = f'state the right unit in trial.toml: [channels] "{header}" = "{name} [UNIT]"'
-        return [_finding(one, "unit_slip", (name, RATES[name]), own.worst, f"{words}: off by {slip[0]:.4g}, {slip[1]}", remedy)]
+        return [
+            _finding(
+                one, "unit_slip", (name, RATES[name]), own.worst, f"{words}: off by {slip[0]:.4g}, {slip[1]}", remedy
+            )
+        ]
     if own.correlation < -_ALIKE:
         remedy = "state the frame of the record in trial.toml: [frame], or mend the sign of one of the two"
-        return [_finding(one, "sign_of_a_rate", (name, RATES[name]), own.worst, f"{words}: they turn against one another", remedy)]
+        return [
+            _finding(
+                one, "sign_of_a_rate", (name, RATES[name]), own.worst, f"{words}: they turn against one another", remedy
+            )
+        ]
     if own.correlation < _ALIKE and abs(own.slope) < 2.0 and abs(own.slope) > 0.5:
         # A noisy rate of the right size: nothing is wrong with it but the noise.
         return []
@@ -161,8 +172,13 @@ def _track(one: Recording) -> list[Finding]:
             course = np.arctan2(paths[1](t, 1), paths[0](t, 1))
             gap = np.abs(np.angle(np.exp(1j * (course - one.channels["psi"].at(t)))))
             what = f"track and heading differ by {math.degrees(away):.0f} deg (root mean square)"
-            remedy = "state the axes in trial.toml: [axes] x = 'east', y = 'north', ..., or the frame; the two cannot both be right"
-            found.append(_finding(one, "track_against_heading", ("north", "east", "psi"), float(t[int(np.argmax(gap))]), what, remedy))
+            remedy = "state the axes in trial.toml, [axes] x = 'east', y = 'north', ..., or the frame; "
+            remedy += "the two cannot both be right"
+            found.append(
+                _finding(
+                    one, "track_against_heading", ("north", "east", "psi"), float(t[int(np.argmax(gap))]), what, remedy
+                )
+            )
     return found
 
 
@@ -177,7 +193,9 @@ def _course(one: Recording, course: Array, t: Array) -> list[Finding]:
         return []
     slip = factor_between(pair.slope / _lag_free(pair.slope))
     words = f"the track turns {pair.slope:.3g} times as far as {one.headers['psi']}"
-    remedy = f'state the right unit in trial.toml: [channels] "{one.headers["psi"]}" = "psi [UNIT]", or that of the track'
+    remedy = (
+        f'state the right unit in trial.toml: [channels] "{one.headers["psi"]}" = "psi [UNIT]", or that of the track'
+    )
     check = "unit_slip" if slip else "track_against_heading"
     more = f": off by {slip[0]:.4g}, {slip[1]}" if slip else ""
     return [_finding(one, check, ("psi", "north", "east"), pair.worst, words + more, remedy)]
@@ -218,7 +236,7 @@ def check_recording(one: Recording) -> list[Finding]:
     -------
     Findings with file, row, columns and remedy.
     """
-    angles = [a for a in ("psi", "phi", "theta", "u") if a in one.channels and len(one.channels[a]) >= 8]
+    angles: list[str] = [a for a in ("psi", "phi", "theta", "u") if a in one.channels and len(one.channels[a]) >= 8]
     slopes = {a: path_of(one.channels[a]) for a in angles}
     return [*_rates(one, slopes), *_track(one)]
 
@@ -246,5 +264,6 @@ def refused(one: Recording, findings: list[Finding], uses_track: bool, heading_s
             break
     else:
         return
-    place = f"{one.file}, row {finding.shown_rows}, column{'s' if len(finding.columns) > 1 else ''} {', '.join(finding.columns)}"
+    many = "s" if len(finding.columns) > 1 else ""
+    place = f"{one.file}, row {finding.shown_rows}, column{many} {', '.join(finding.columns)}"
     raise InputError(place, finding.what, finding.remedy)

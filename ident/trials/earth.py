@@ -54,7 +54,11 @@ def _scaled(one: Recording, scale: float) -> Recording:
         for k, r in one.channels.items()
         if k not in ("lat", "lon")
     }
-    channels |= {k: replace(one.channels[k], abscissa=one.channels[k].abscissa * root) for k in ("lat", "lon") if k in one.channels}
+    channels |= {
+        k: replace(one.channels[k], abscissa=one.channels[k].abscissa * root)
+        for k in ("lat", "lon")
+        if k in one.channels
+    }
     rows = (one.rows[0] * root, one.rows[1])
     text = f"scale {scale:g}: brought to full scale by Froude's law"
     return one.with_(channels=channels, rows=rows, time_sigma=one.time_sigma * root, assumed=(*one.assumed, text))
@@ -124,7 +128,16 @@ def _axes(one: Recording, x: Record, y: Record, spec: TrialFile) -> tuple[list[t
     if "psi" not in one.channels:
         return usual, "x and y: axes not named, x north and y east taken (only the side of the turn depends on it)"
     fits = []
-    for names in (("north", "east"), ("east", "north"), ("north", "west"), ("west", "north"), ("south", "west"), ("south", "east"), ("east", "south"), ("west", "south")):
+    for names in (
+        ("north", "east"),
+        ("east", "north"),
+        ("north", "west"),
+        ("west", "north"),
+        ("south", "west"),
+        ("south", "east"),
+        ("east", "south"),
+        ("west", "south"),
+    ):
         away = drift(one.channels["psi"], x, y, [_TURNS[n] for n in names])
         if away is not None and away < _MOST_DRIFT:
             fits.append((away, names))
@@ -159,7 +172,9 @@ def _through_water(one: Recording, spec: TrialFile) -> Recording:
     if not spec.current.correct:
         return one.with_(assumed=(*one.assumed, "current: stated, the track over ground is measured"))
     if "north" not in one.channels:
-        raise InputError(f"{one.file}, key current", "a current, and no track it could be taken off", "a track, or no [current]")
+        raise InputError(
+            f"{one.file}, key current", "a current, and no track it could be taken off", "a track, or no [current]"
+        )
     to, channels = math.radians(spec.current.to_deg), dict(one.channels)
     for name, share in (("north", math.cos(to)), ("east", math.sin(to))):
         record = channels[name]

@@ -42,7 +42,9 @@ def _history(axes: Axes, one: Trial, name: str) -> None:
     record, path = one.recording.channels[name], one.paths[name]
     unit = 180.0 / math.pi if record.unit.startswith("rad") else 1.0
     base = _base(one, name)
-    axes.plot(record.abscissa - one.start.time, unit * (record.value - base), ".", ms=2.5, color=_MEASURED, label="samples")
+    axes.plot(
+        record.abscissa - one.start.time, unit * (record.value - base), ".", ms=2.5, color=_MEASURED, label="samples"
+    )
     grid = np.linspace(max(one.start.time, float(path.knots[4])), float(path.knots[-5]), 1500)
     axes.plot(grid - one.start.time, unit * (path(grid) - base), color=_SMOOTH, lw=1.2, label="smooth path")
     word, shown = _LABELS.get(name, (name, record.unit))
@@ -56,7 +58,14 @@ def _zigzag_events(axes: Axes, one: Trial) -> None:
     control = control_of(one.recording, one.maneuver.kind == "vertical_zigzag")
     if control is not None:
         t = control.abscissa - one.start.time
-        axes.step(t, np.degrees(control.value), where="post", color=_CONTROL, lw=0.9, label="rudder" if one.maneuver.horizontal else "planes")
+        axes.step(
+            t,
+            np.degrees(control.value),
+            where="post",
+            color=_CONTROL,
+            lw=0.9,
+            label="rudder" if one.maneuver.horizontal else "planes",
+        )
     check = one.maneuver.check or 0.0
     for side in (1.0, -1.0):
         axes.axhline(side * check, color="0.6", lw=0.6, ls="--")
@@ -70,7 +79,14 @@ def _zigzag_events(axes: Axes, one: Trial) -> None:
         axes.plot([at.value], [there], "o", ms=4, mfc="white", color=_SMOOTH)
         if over is not None:
             text = f"{over.value:.2f} $\\pm$ {over.sigma:.2g} deg"
-            axes.annotate(text, (at.value, sense * (check + over.value)), xytext=(4, 4 * sense), textcoords="offset points", fontsize=7, va="bottom" if sense > 0 else "top")
+            axes.annotate(
+                text,
+                (at.value, sense * (check + over.value)),
+                xytext=(4, 4 * sense),
+                textcoords="offset points",
+                fontsize=7,
+                va="bottom" if sense > 0 else "top",
+            )
     axes.margins(y=0.12)
 
 
@@ -99,12 +115,33 @@ def _track(axes: Axes, one: Trial) -> None:
     if a and t:
         axes.plot([0.0, side * t.value], [a.value, a.value], color=_CONTROL, lw=0.8)
         axes.plot([0.0, 0.0], [0.0, a.value], color=_CONTROL, lw=0.8)
-        axes.annotate(f"advance {a.value:.1f} $\\pm$ {a.sigma:.2g} m", (0.0, 0.5 * a.value), rotation=90, fontsize=7, ha="right" if side > 0 else "left", va="center")
-        axes.annotate(f"transfer {t.value:.1f} $\\pm$ {t.sigma:.2g} m", (0.5 * side * t.value, a.value), fontsize=7, ha="center", va="bottom")
+        axes.annotate(
+            f"advance {a.value:.1f} $\\pm$ {a.sigma:.2g} m",
+            (0.0, 0.5 * a.value),
+            rotation=90,
+            fontsize=7,
+            ha="right" if side > 0 else "left",
+            va="center",
+        )
+        axes.annotate(
+            f"transfer {t.value:.1f} $\\pm$ {t.sigma:.2g} m",
+            (0.5 * side * t.value, a.value),
+            fontsize=7,
+            ha="center",
+            va="bottom",
+        )
     if d:
         low = float(np.min(along))
         axes.plot([0.0, side * d.value], [low, low], color=_CONTROL, lw=0.8)
-        axes.annotate(f"tactical diameter {d.value:.1f} $\\pm$ {d.sigma:.2g} m", (0.5 * side * d.value, low), fontsize=7, ha="center", va="top", xytext=(0, -3), textcoords="offset points")
+        axes.annotate(
+            f"tactical diameter {d.value:.1f} $\\pm$ {d.sigma:.2g} m",
+            (0.5 * side * d.value, low),
+            fontsize=7,
+            ha="center",
+            va="top",
+            xytext=(0, -3),
+            textcoords="offset points",
+        )
     axes.set_aspect("equal", adjustable="datalim")
     axes.margins(0.1)
     axes.set_xlabel("across the first course, to starboard [m]", fontsize=8)
@@ -147,8 +184,14 @@ def trial_figure(one: Trial, folder: Path) -> Path:
     others = [n for n in ("U", "u", "z", "phi", "theta") if n in one.paths and n != main][:2]
     track = {"north", "east"} <= set(one.paths)
     rows = [*([main] if main else []), *others]
-    figure = pyplot.figure(figsize=(11.0 if track else 7.5, 1.6 + 2.1 * max(len(rows) + bool(main), 2)), layout="constrained")
-    grid = figure.add_gridspec(max(len(rows) + bool(main), 1), 2 if track and rows else 1, height_ratios=[2.2 if r == main else 1.0 for r in [*rows, *(["rest"] if main else [])]] or [1.0])
+    figure = pyplot.figure(
+        figsize=(11.0 if track else 7.5, 1.6 + 2.1 * max(len(rows) + bool(main), 2)), layout="constrained"
+    )
+    grid = figure.add_gridspec(
+        max(len(rows) + bool(main), 1),
+        2 if track and rows else 1,
+        height_ratios=[2.2 if r == main else 1.0 for r in [*rows, *(["rest"] if main else [])]] or [1.0],
+    )
     first = None
     for i, name in enumerate(rows):
         axes = figure.add_subplot(grid[i, 0], sharex=first)
@@ -158,7 +201,9 @@ def trial_figure(one: Trial, folder: Path) -> Path:
             _zigzag_events(axes, one)
         axes.tick_params(labelsize=8)
         if i == 0:
-            axes.legend(fontsize=7, loc="lower left", bbox_to_anchor=(0.0, 1.0), borderaxespad=0.2, frameon=False, ncols=3)
+            axes.legend(
+                fontsize=7, loc="lower left", bbox_to_anchor=(0.0, 1.0), borderaxespad=0.2, frameon=False, ncols=3
+            )
     if main:
         _residuals(figure.add_subplot(grid[len(rows), 0], sharex=first), one, main)
     if track:

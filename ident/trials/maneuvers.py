@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import re
 from dataclasses import dataclass
@@ -31,6 +32,8 @@ _ALLOWED = "zigzag 20/20, vertical_zigzag 10/10, turning_circle 35, " + ", ".joi
 # Check angles in use, and how far after the reversal its effect is seen in the heading.
 _CHECKS = (1.0, 2.0, 3.0, 5.0, 7.0, 10.0, 15.0, 20.0, 25.0, 30.0, 35.0)
 _NOTICE = math.radians(0.3)
+# A step of a spiral is held for longer [s].
+_STEADY_S = 5.0
 
 
 @dataclass(frozen=True)
@@ -92,7 +95,6 @@ class Hold:
     start: float
     end: float
     value: float
-    before: float
 
 
 def holds(record: Record) -> list[Hold]:
@@ -100,19 +102,24 @@ def holds(record: Record) -> list[Hold]:
     t, x = record.abscissa, record.value
     spread = float(np.percentile(x, 98) - np.percentile(x, 2))
     tolerance = max(0.04 * spread, 4.0 * 1.4826 * float(np.median(np.abs(np.diff(x)))), math.radians(0.2))
+    total = np.concatenate([[0.0], np.cumsum(x)])
     out: list[Hold] = []
     start = 0
     for i in range(1, len(x) + 1):
-        if i < len(x) and abs(x[i] - float(np.median(x[max(start, i - 50) : i]))) <= tolerance:
+        mean = (total[i] - total[start]) / (i - start)
+        if i < len(x) and abs(x[i] - mean) <= tolerance:
             continue
-        if i - start >= 3 or i == len(x) > start:
-            value = float(np.median(x[start:i]))
-            before = float(t[start - 1]) if start else float(t[0])
-            # A plateau, not a piece of a ramp: most of it lies within a third of the tolerance.
-            if i - start >= 3 and abs(float(x[i - 1] - x[start])) < tolerance:
-                out.append(Hold(float(t[start]), float(t[i - 1]), value, before))
+        # A plateau, not a piece of a ramp: its ends are alike.
+        if i - start >= 3 and abs(float(x[i - 1] - x[start])) < tolerance:
+            out.append(Hold(float(t[start]), float(t[i - 1]), float(np.median(x[start:i]))))
         start = i
     return out
+
+
+def large(levels: list[Hold]) -> list[Hold]:
+    """The holds of a maneuver, not those by which a straight course is kept."""
+    most = max((abs(h.value) for h in levels), default=0.0)
+    return [h for h in levels if most > math.radians(0.5) and abs(h.value) > 0.4 * most]
 
 
 def control_of(one: Recording, vertical: bool = False) -> Record | None:
@@ -122,31 +129,39 @@ def control_of(one: Recording, vertical: bool = False) -> Record | None:
 
 
 def _by_control(one: Recording, angle: Record, control: Record, vertical: bool) -> Maneuver | None:
+    """A maneuver from the steps of rudder or planes and what the angle does."""
     levels = holds(control)
-    used = [h for h in levels if abs(h.value) > math.radians(0.5)]
+    used = large(levels)
     if not used:
         return None
-    base = float(np.median(angle.value[angle.abscissa <= used[0].start + 1e-9][-20:])) if used[0].start > 0 else float(angle.value[0])
-    turned = angle.value - base
-    signs = [math.copysign(1.0, h.value) for h in used]
+    before = angle.value[angle.abscissa <= used[0].start + 1e-9]
+    turned = angle.value - float(np.median(before[-20:] if used[0].start > 0.0 else angle.value[:1]))
     planes = round(math.degrees(float(np.median([abs(h.value) for h in used]))) * 2.0) / 2.0
-    alternating = len(used) >= 2 and all(a != b for a, b in zip(signs, signs[1:], strict=False))
-    if alternating and np.ptp(turned) < math.radians(170.0) and len(used) == len([h for h in used if abs(abs(math.degrees(h.value)) - planes) < 0.2 * planes]):
-        at = [abs(float(angle.at(0.5 * (h.start + h.before)) - base)) for h in used[1:]]
-        check = round(math.degrees(float(np.median(at))))
-        near = min(_CHECKS, key=lambda c: abs(c - math.degrees(float(np.median(at)))))
-        check = near if abs(near - math.degrees(float(np.median(at)))) < max(1.0, 0.08 * near) else check
-        return Maneuver("vertical_zigzag" if vertical else "zigzag", planes, float(check))
+    zigzag = _zigzag_by_control(used, angle.abscissa, turned, planes)
+    if zigzag is not None:
+        return Maneuver("vertical_zigzag" if vertical else "zigzag", planes, zigzag)
     if vertical:
         return None
-    values = {round(math.degrees(h.value)) for h in levels}
-    if len(values) >= 5:
+    if len({round(math.degrees(h.value)) for h in levels if h.end - h.start > _STEADY_S}) >= 5:
         return Maneuver("direct_spiral")
-    if len(used) < len(levels) and any(abs(h.value) <= math.radians(0.5) and h.start > used[0].start for h in levels):
+    if any(abs(h.value) < 0.1 * abs(used[0].value) and h.start > used[0].start for h in levels):
         return Maneuver("pull_out")
     if len(used) == 1 and abs(turned[-1]) > math.radians(120.0):
         return Maneuver("turning_circle", planes)
     return None
+
+
+def _zigzag_by_control(used: list[Hold], t: Array, turned: Array, planes: float) -> float | None:
+    """Check angle [deg] where the steps are those of a zigzag: to and fro by one angle."""
+    sides = [math.copysign(1.0, h.value) for h in used]
+    to_and_fro = len(used) >= 2 and all(a != b for a, b in itertools.pairwise(sides))
+    alike = all(abs(abs(math.degrees(h.value)) - planes) < 0.2 * planes for h in used)
+    if not (to_and_fro and alike and np.ptp(turned) < math.radians(170.0)):
+        return None
+    half = 0.5 * float(np.median(np.diff(t)))
+    at = math.degrees(float(np.median([abs(np.interp(h.end + half, t, turned)) for h in used[:-1]])))
+    near = min(_CHECKS, key=lambda c: abs(c - at))
+    return near if abs(near - at) < max(1.0, 0.08 * near) else float(round(at))
 
 
 def reversal_angle(t: Array, path: SmoothPath, base: float) -> tuple[float, list[float]]:
@@ -167,7 +182,7 @@ def reversal_angle(t: Array, path: SmoothPath, base: float) -> tuple[float, list
     turns = np.flatnonzero(rate[:-1] * rate[1:] < 0.0)
     ends = [i for i in turns if abs(x[i]) > 0.25 * float(np.max(np.abs(x)))]
     seen = []
-    for before, end in zip([0, *ends], ends, strict=False):
+    for before, end in zip([0, *map(int, ends)], map(int, ends), strict=False):
         if end - before < 20:
             continue
         sense = math.copysign(1.0, x[end])
@@ -188,7 +203,11 @@ def _by_angle(one: Recording, name: str) -> tuple[Maneuver, str] | None:
     path = smooth([Samples(record.abscissa, record.value, 0, 0.0)])
     base = float(path(record.abscissa[0]))
     turned = path(record.abscissa) - base
-    if name == "psi" and abs(turned[-1]) > math.radians(120.0) and abs(turned[-1]) > 0.9 * float(np.max(np.abs(turned))):
+    if (
+        name == "psi"
+        and abs(turned[-1]) > math.radians(120.0)
+        and abs(turned[-1]) > 0.9 * float(np.max(np.abs(turned)))
+    ):
         return Maneuver("turning_circle"), "turning circle: the heading turns on to one side"
     high, low = float(turned.max()), float(turned.min())
     if min(high, -low) < math.radians(0.5) or min(high, -low) < 0.25 * max(high, -low):
@@ -196,11 +215,10 @@ def _by_angle(one: Recording, name: str) -> tuple[Maneuver, str] | None:
     check, seen = reversal_angle(record.abscissa, path, base)
     if math.isnan(check):
         return None
-    kind = "zigzag" if name == "psi" else "vertical_zigzag"
+    kind, control, motion = ("zigzag", "rudder", "yaw") if name == "psi" else ("vertical_zigzag", "plane", "pitch")
     shown = ", ".join(f"{s:.1f}" for s in seen)
-    control = "rudder" if name == "psi" else "plane"
-    text = f"{kind} with check angle {check:g} deg: no {control} in the record; {'yaw' if name == 'psi' else 'pitch'} begins to slow down at {shown} deg. State it if it is another: --maneuver \"zigzag D/C\""
-    return Maneuver(kind, None, check), text
+    text = f"{kind} with check angle {check:g} deg: no {control} in the record; {motion} begins to slow down at {shown}"
+    return Maneuver(kind, None, check), text + f' deg. State it if it is another: --maneuver "{kind} D/C"'
 
 
 def maneuver_of(one: Recording, text: str) -> tuple[Maneuver, str]:

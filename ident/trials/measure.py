@@ -2,7 +2,8 @@
 
 The estimators of ``ident.metrics`` are applied to the most likely smooth path of each channel, and to
 draws from its posterior, with execute and base course drawn from their errors: the spread of a metric
-over the draws about its value is its standard error, bias of an extreme included.
+over the draws about its value, and what a second smoothing changes, make its standard error: noise and
+sampling, the bias of an extreme and the bias of smoothing.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ Array = NDArray[np.float64]
 Channels = dict[str, Array]
 Metrics = dict[str, float | None]
 DRAWS = 200
-_GRID = 2400
+_STEP_S, _GRID = 0.15, (1200, 3000)
 # No record says when and where more closely than this, in the unit of the metric.
 _LEAST = {"deg": 1e-3, "s": 1e-3, "m": 1e-3, "deg/s": 1e-4, "m/s": 1e-4, "-": 1e-5, "%": 1e-3, "deg s/deg": 1e-3}
 
@@ -47,15 +48,23 @@ class Value:
 
 def unit_of(name: str) -> str:
     """Unit of a metric, by its name."""
-    for end, unit in (("_degps", "deg/s"), ("_mps", "m/s"), ("_deg", "deg"), ("_percent", "%"), ("_m", "m"), ("_s", "s"), ("_rps", "1/s")):
+    for end, unit in (
+        ("_degps", "deg/s"),
+        ("_mps", "m/s"),
+        ("_deg", "deg"),
+        ("_percent", "%"),
+        ("_m", "m"),
+        ("_s", "s"),
+        ("_rps", "1/s"),
+    ):
         if name.endswith(end):
             return unit
     return "deg/s" if "degps" in name and not name.endswith("deg") else "-"
 
 
-def _grid(paths: dict[str, SmoothPath], begin: float, end: float) -> Array:
-    del paths
-    return np.linspace(begin, end, _GRID)
+def _grid(begin: float, end: float) -> Array:
+    """Times at which draws are measured: fine enough for straight lines between them."""
+    return np.linspace(begin, end, int(np.clip((end - begin) / _STEP_S, *_GRID)))
 
 
 @dataclass(frozen=True)
@@ -236,7 +245,9 @@ _NEEDS = {
 }
 
 
-def _estimator(one: Recording, maneuver: Maneuver, start: Start, spec: TrialFile, likely: Drawn) -> Callable[[Drawn], Metrics]:
+def _estimator(
+    one: Recording, maneuver: Maneuver, start: Start, spec: TrialFile, likely: Drawn
+) -> Callable[[Drawn], Metrics]:
     """The function that measures a draw."""
     missing = [c for c in _NEEDS.get(maneuver.kind, ()) if c not in likely.values]
     if missing or (maneuver.kind == "turning_circle" and not {"psi", "north"} & set(likely.values)):
@@ -261,9 +272,11 @@ def _estimator(one: Recording, maneuver: Maneuver, start: Start, spec: TrialFile
     }[maneuver.kind]
 
 
-def with_errors(measure: Callable[[Drawn], Metrics], likely: Drawn, draws: list[Drawn]) -> dict[str, Value]:
-    """Metrics of the most likely path with the spread over the draws about them."""
-    best = measure(likely)
+def with_errors(
+    measure: Callable[[Drawn], Metrics], likely: Drawn, again: Drawn, draws: list[Drawn]
+) -> dict[str, Value]:
+    """Metrics of the most likely path, with the spread over the draws and the bias of smoothing."""
+    best, twice = measure(likely), measure(again)
     spread: dict[str, list[float]] = {name: [] for name in best}
     for one in draws:
         for name, value in measure(one).items():
@@ -275,8 +288,10 @@ def with_errors(measure: Callable[[Drawn], Metrics], likely: Drawn, draws: list[
         if value is None or drawn.size < 0.9 * len(draws):
             continue
         unit = unit_of(name)
-        sigma = float(np.sqrt(np.mean((drawn - value) ** 2)))
-        found[name] = Value(float(value), math.hypot(sigma, _LEAST.get(unit, 1e-6)), unit)
+        smoother = twice.get(name)
+        bias = 0.0 if smoother is None else smoother - value
+        sigma = math.sqrt(float(np.mean((drawn - value) ** 2)) + bias**2 + _LEAST.get(unit, 1e-6) ** 2)
+        found[name] = Value(float(value), sigma, unit)
     return found
 
 
@@ -297,10 +312,11 @@ def measured(
         When the record lacks a channel that the maneuver is measured on.
     """
     end = min(float(p.knots[-5]) for p in paths.values())
-    grid = _grid(paths, start.time, end)
+    grid = _grid(start.time, end)
     likely = _most_likely(paths, grid, start)
     measure = _estimator(one, maneuver, start, spec, likely)
-    found = with_errors(measure, likely, _draws(paths, grid, start, count, 0))
+    again = _most_likely({k: p.again() for k, p in paths.items()}, grid, start)
+    found = with_errors(measure, likely, again, _draws(paths, grid, start, count, 0))
     return found | _approach_speed(one, paths, start)
 
 

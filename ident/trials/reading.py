@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ident.captive.quantities import is_unit
 from ident.captive.readers.opening import open_sheet, reader_of
 from ident.captive.readers.table import Sheet
-from ident.captive.readers.text import COMMENTS, head
+from ident.captive.readers.text import head
 from ident.captive.source import Source
 from ident.checks.findings import Finding
 from ident.trials.channels import Meaning, channel_of, meaning, plain
@@ -133,9 +133,7 @@ def _meanings(sheet: Sheet, header: list[str], spec: TrialFile, said: list[str])
     for key in spec.channels:
         if key not in header and key not in [h.partition(" [")[0] for h in header]:
             raise InputError(f"{sheet.path}, key channels", f"no column {key!r}", ", ".join(header)[:200])
-    found = [
-        meaning(h, spec.channels.get(h, spec.channels.get(h.partition(" [")[0])), sheet.where) for h in header
-    ]
+    found = [meaning(h, spec.channels.get(h, spec.channels.get(h.partition(" [")[0])), sheet.where) for h in header]
     for one in (f for f in found if f is not None):
         twice = [f.header for f in found if f is not None and f.channel == one.channel]
         if len(twice) > 1:
@@ -166,7 +164,12 @@ def _wide(
         raise InputError(place, repr(cells[bad][clock][:40]), "seconds, hh:mm:ss, or an ISO date and time")
     as_clock = sheet.dialect.number(cells[0][clock]) is None
     times = stamps(
-        [c[clock] for c in cells], np.array(raw, dtype=float), 1.0 if as_clock else one.factor, str(sheet.path), rows, one.header
+        [c[clock] for c in cells],
+        np.array(raw, dtype=float),
+        1.0 if as_clock else one.factor,
+        str(sheet.path),
+        rows,
+        one.header,
     )
     said += times.said
     zero = 0.0 if as_clock else float(raw[0] or 0.0) * one.factor
@@ -211,7 +214,9 @@ def _long(
     named = words.index("source") if "source" in words else None
     sources = list(dict.fromkeys(c[named] for c in cells)) if named is not None else []
     if len(sources) > 1:
-        raise InputError(f"{sheet.path}, column source", f"{len(sources)} sources: {', '.join(sources)[:120]}", "one trial a file")
+        raise InputError(
+            f"{sheet.path}, column source", f"{len(sources)} sources: {', '.join(sources)[:120]}", "one trial a file"
+        )
     channels, headers, findings = {}, {"t": header[clock]}, []
     everything: list[tuple[Array, list[int]]] = []
     for name in dict.fromkeys(c[at["channel"]] for c in cells):
@@ -225,12 +230,16 @@ def _long(
         raw = [parsed(cells[i][clock], sheet.dialect.number(cells[i][clock])) for i in mine]
         bad = next((i for i, v in enumerate(raw) if v is None), None)
         if bad is not None:
-            raise InputError(f"{sheet.path}, row {place[bad]}, column {header[clock]}", repr(cells[mine[bad]][clock]), "a time")
+            raise InputError(
+                f"{sheet.path}, row {place[bad]}, column {header[clock]}", repr(cells[mine[bad]][clock]), "a time"
+            )
         first = np.array(raw, dtype=float)
         times = stamps([cells[i][clock] for i in mine], first, 1.0, str(sheet.path), place, header[clock])
         value = _numbers(sheet, place, [cells[i] for i in mine], at["value"], what)
         kept = np.isfinite(value)
-        channels[what.channel] = Record(what.channel, (times.time + first[0])[kept], value[kept] * what.factor, what.unit)
+        channels[what.channel] = Record(
+            what.channel, (times.time + first[0])[kept], value[kept] * what.factor, what.unit
+        )
         headers[what.channel] = name
         said += [s for s in times.said if s not in said]
         findings += list(times.findings)

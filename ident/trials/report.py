@@ -195,5 +195,14 @@ def _show_scatter(done: Trials, console: Console) -> None:
         gap = r.get("port_less_starboard")
         shown = "" if gap is None else " +- ".join(rounded(gap["value"], gap["sigma"]))
         spread = "-" if r["scatter"] is None else f"{r['scatter']:.3g}"
-        table.add_row(r["maneuver"], r["side"], r["metric"], str(r["runs"]), f"{r['mean']:.5g}", spread, f"{r['stated']:.2g}", shown)
+        table.add_row(
+            r["maneuver"],
+            r["side"],
+            r["metric"],
+            str(r["runs"]),
+            f"{r['mean']:.5g}",
+            spread,
+            f"{r['stated']:.2g}",
+            shown,
+        )
     console.print(table)

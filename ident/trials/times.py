@@ -76,7 +76,10 @@ def _even(raw: Array, half: Array) -> tuple[float, float] | None:
     weight = 1.0 / half
     fit = np.linalg.lstsq(np.column_stack([np.ones(raw.size), row]) * weight[:, None], raw * weight, rcond=None)[0]
     start, step = float(fit[0]), float(fit[1])
-    for simple in (*(float(f"{step:.{k}g}") for k in (1, 2, 3)), *(1.0 / round(1.0 / step, k) for k in (0, 1) if round(1.0 / step, k))):
+    for simple in (
+        *(float(f"{step:.{k}g}") for k in (1, 2, 3)),
+        *(1.0 / round(1.0 / step, k) for k in (0, 1) if round(1.0 / step, k)),
+    ):
         offset = raw - simple * row
         lo, hi = float(np.max(offset - half)), float(np.min(offset + half))
         if lo <= hi + 1e-9:
@@ -104,8 +107,8 @@ def stamps(cells: list[str], raw: Array, factor: float, path: str, rows: list[in
     said: list[str] = []
     clock = [bool(_CLOCK.fullmatch(c.strip())) for c in cells]
     if all(clock):
-        turn = 43200.0 if False else _DAY
-        raw = raw + turn * np.cumsum(np.concatenate([[0.0], np.diff(raw) < -0.5 * turn]))
+        midnights = np.cumsum(np.concatenate([[0.0], np.diff(raw) < -0.5 * _DAY]))
+        raw = raw + _DAY * midnights.astype(np.float64)
         said.append(f"{column}: times of day, counted from {cells[0].strip()}")
     step = np.diff(raw)
     back = np.flatnonzero(step < 0.0)
@@ -139,6 +142,8 @@ def _gaps(time: Array, path: str, rows: list[int], column: str) -> list[Finding]
     if not wide.size:
         return []
     places = tuple(rows[int(i) + 1] for i in wide)
-    what = f"the clock jumps {len(places)} times, at most by {float(step[wide].max()):.3g} s where {usual:.3g} s is usual"
+    what = (
+        f"the clock jumps {len(places)} times, at most by {float(step[wide].max()):.3g} s where {usual:.3g} s is usual"
+    )
     remedy = "look for lost samples; what falls into a gap has the error of a curve drawn across it"
     return [Finding("clock_gaps", "warning", path, places, (column,), f"{what} (row {spans(places)})", remedy)]

@@ -63,7 +63,10 @@ class Trial:
 def _borne_out(one: Recording, maneuver: Maneuver, findings: list[Finding]) -> bool:
     """Whether rudder or track say that the angle measured on has the right size."""
     headings = {one.headers.get("psi", "")}
-    if any(f.check in ("unit_slip", "track_against_heading") and "track" in f.what and headings & set(f.columns) for f in findings):
+    if any(
+        f.check in ("unit_slip", "track_against_heading") and "track" in f.what and headings & set(f.columns)
+        for f in findings
+    ):
         return False
     by_control = control_of(one, maneuver.kind == "vertical_zigzag") is not None
     plausible = maneuver.check is None or maneuver.planes is None or maneuver.check >= _LEAST_CHECK * maneuver.planes
@@ -78,7 +81,7 @@ def _swings(trial: Trial) -> None:
     record, header = trial.recording.channels[name], trial.recording.headers[name]
     size = math.degrees(float(np.max(np.abs(record.value - float(trial.paths[name](trial.start.time))))))
     place = f"{trial.recording.file}, column {header}"
-    remedy = f'the unit of {header} (degrees and radians?), the maneuver, or execute_s; [channels] in trial.toml states a unit'
+    remedy = f"the unit of {header} (degrees and radians?), the maneuver, or execute_s, in trial.toml"
     if size > _MOST_SWING:
         raise InputError(place, f"a zigzag that swings by {size:.4g} deg", remedy)
     if "execute_2_s" not in trial.metrics:
@@ -112,7 +115,12 @@ def measure_trial(path: Path, spec: TrialFile | None = None, count: int = DRAWS)
     findings = [*one.findings, *check_recording(one)]
     # Exchanged channels would be taken for a maneuver that was not made.
     refused(one, [f for f in findings if f.check == "exchanged_channels"], True, True)
-    maneuver, by = maneuver_of(one, spec.maneuver)
+    try:
+        maneuver, by = maneuver_of(one, spec.maneuver)
+    except InputError:
+        # A unit slip hides the maneuver: it is said first.
+        refused(one, findings, True, False)
+        raise
     track = maneuver.kind in ("turning_circle", "stopping")
     sure = _borne_out(one, maneuver, findings)
     refused(one, findings, track, sure)

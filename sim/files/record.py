@@ -51,7 +51,7 @@ class Record:
 
     def at(self, where: Array | float) -> Array:
         """Value at places of the abscissa, linearly between the samples."""
-        return np.interp(where, self.abscissa, self.value)
+        return np.asarray(np.interp(where, self.abscissa, self.value))
 
     def kept(self, which: NDArray[np.bool_] | slice) -> Record:
         """Some of the samples."""

@@ -1,0 +1,131 @@
+"""Channels exchanged, units off by 57.3 or 1.94, gaps, spikes: a finding with file, row and remedy, or a refusal."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from trial_records import truth, turn, write, zigzag
+
+from ident.cli import main
+from ident.trials.spec import TrialFile
+from ident.trials.trial import measure_trial
+from sim.files.errors import InputError
+
+COUNT = 10
+
+
+def zigzag_columns(**changes):
+    one = zigzag()
+    record = {"t [s]": one["t"], "psi [deg]": one["psi"], "r [deg/s]": one["r"], "u [m/s]": one["u"]}
+    record |= {"x [m]": one["x"], "y [m]": one["y"], "delta [deg]": one["dH"]}
+    return record | {k.replace("__", " "): v for k, v in changes.items()}
+
+
+def turn_columns():
+    one = turn()
+    record = {"t [s]": one["t"], "x_north [m]": one["x"], "y_east [m]": one["y"], "psi [deg]": one["psi"]}
+    return record | {"speed [m/s]": one["speed"]}
+
+
+def refusal(tmp_path, record, spec=None):
+    with pytest.raises(InputError) as caught:
+        measure_trial(write(tmp_path / "one.csv", record), spec, COUNT)
+    return caught.value
+
+
+@pytest.mark.parametrize("roll", [False, True])
+def test_yaw_rate_under_the_name_p_is_refused_by_name(tmp_path, roll):
+    record = zigzag_columns()
+    record["p [deg/s]"] = record.pop("r [deg/s]")
+    if roll:
+        record["r [deg/s]"] = 0.3 * np.sin(record["t [s]"] / 2.0)
+    error = refusal(tmp_path, record)
+    assert "one.csv, row" in error.where
+    assert "p [deg/s]" in error.where
+    assert "channels exchanged" in error.found
+    assert '"p [deg/s]" = "r [UNIT]"' in error.allowed
+    done = CliRunner().invoke(main, ["trial", str(tmp_path / "one.csv"), "--json", "-"])
+    assert done.exit_code == 2
+    if not roll:
+        spec = TrialFile(channels={"p [deg/s]": "r [deg/s]"})
+        assert measure_trial(tmp_path / "one.csv", spec, COUNT).findings == ()
+
+
+def test_rate_in_radians_is_found_and_not_used(tmp_path):
+    record = zigzag_columns()
+    record["r [deg/s]"] = np.radians(record["r [deg/s]"])
+    done = measure_trial(write(tmp_path / "one.csv", record), None, COUNT)
+    (finding,) = done.findings
+    assert (finding.check, finding.severity) == ("unit_slip", "error")
+    assert "57.3" in finding.what or "0.01745" in finding.what
+    assert finding.rows
+    assert '[channels] "r [deg/s]"' in finding.remedy
+    assert done.metrics["overshoot_1_deg"].value == pytest.approx(truth()["zigzag"]["overshoot_1_deg"], abs=0.01)
+
+
+def test_heading_and_rate_alone_that_differ_by_57_are_refused(tmp_path):
+    one = zigzag()
+    record = {"t [s]": one["t"], "psi [deg]": one["psi"], "r [deg/s]": np.radians(one["r"])}
+    assert "degrees and radians" in refusal(tmp_path, record).found
+
+
+@pytest.mark.parametrize(
+    ("record", "words"),
+    [
+        (lambda: zigzag_columns() | {"psi [deg]": np.radians(zigzag()["psi"])}, "degrees and radians"),
+        (lambda: {"t [s]": zigzag()["t"], "psi [rad]": zigzag()["psi"]}, "a zigzag that swings by"),
+        (lambda: turn_columns() | {"psi [deg]": np.radians(turn()["psi"])}, "degrees and radians"),
+        (lambda: turn_columns() | {"speed [m/s]": turn()["speed"] / 0.514444}, "knots and m/s"),
+        (lambda: turn_columns() | {"x_north [m]": turn()["y"], "y_east [m]": turn()["x"]}, "track and heading differ"),
+    ],
+    ids=["heading in radians", "radians that are degrees", "turn in radians", "knots", "north and east exchanged"],
+)
+def test_slips_that_decide_a_number_are_refused(tmp_path, record, words):
+    error = refusal(tmp_path, record())
+    assert words in error.found
+    assert "one.csv" in error.where
+
+
+def test_speed_in_knots_beside_a_heading_is_a_finding(tmp_path):
+    record = zigzag_columns()
+    record["u [m/s]"] = record["u [m/s]"] / 0.514444
+    done = measure_trial(write(tmp_path / "one.csv", record), None, COUNT)
+    assert any("knots and m/s" in f.what and f.rows for f in done.findings)
+
+
+def test_a_check_angle_never_reached_is_refused(tmp_path):
+    one = zigzag()
+    record = {"t [s]": one["t"], "psi [deg]": np.radians(one["psi"])}
+    error = refusal(tmp_path, record, TrialFile(maneuver="zigzag 20/20"))
+    assert "never comes to 20 deg" in error.found
+
+
+def test_gap_and_spike_are_named_by_row_and_change_little(tmp_path):
+    record = {k: v.copy() for k, v in zigzag_columns().items()}
+    record["psi [deg]"][150] = -999.0
+    kept = np.ones(record["t [s]"].size, dtype=bool)
+    kept[205:225] = False
+    done = measure_trial(write(tmp_path / "one.csv", {k: v[kept] for k, v in record.items()}), None, COUNT)
+    assert {f.check: f.rows for f in done.findings} == {"clock_gaps": (207,), "spikes": (152,)}
+    known = truth()["zigzag"]
+    for name in ("overshoot_1_deg", "overshoot_2_deg", "execute_3_s"):
+        assert abs(done.metrics[name].value - known[name]) < 3.0 * done.metrics[name].sigma
+
+
+def test_missing_units_and_columns_are_named(tmp_path):
+    one = zigzag()
+    error = refusal(tmp_path, {"t [s]": one["t"], "psi": one["psi"]})
+    assert "no unit for psi" in error.found
+    assert '"psi [deg]"' in error.allowed
+    error = refusal(tmp_path, {"t [s]": one["t"], "psi [deg]": one["psi"], "heading [deg]": one["psi"]})
+    assert "both hold psi" in error.found
+    error = refusal(tmp_path, {"t [s]": one["t"], "psi [deg]": one["psi"]}, TrialFile(channels={"gyro": "psi"}))
+    assert "no column 'gyro'" in error.found
+
+
+def test_clock_that_steps_back_is_refused(tmp_path):
+    record = zigzag_columns()
+    record["t [s]"] = record["t [s]"].copy()
+    record["t [s]"][100:] -= 20.0
+    assert "after" in refusal(tmp_path, record).found
