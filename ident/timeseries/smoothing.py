@@ -129,7 +129,7 @@ def knots_for(time: Array, lo: float | None = None, hi: float | None = None) -> 
     typical = float(np.median(steps)) if steps.size else end - start
     count = int(np.clip(math.ceil((end - start) / max(typical, 1e-12)), 4, _MOST_KNOTS))
     step = (end - start) / count
-    return start + step * np.arange(-_DEGREE, count + _DEGREE + 1)
+    return np.asarray(start + step * np.arange(-_DEGREE, count + _DEGREE + 1, dtype=float))
 
 
 def _values(knots: Array, time: Array, derivative: int) -> tuple[Array, NDArray[np.int64]]:

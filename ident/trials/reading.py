@@ -163,6 +163,8 @@ def _wide(
         place = f"{sheet.path}, row {rows[bad]}, column {one.header}"
         raise InputError(place, repr(cells[bad][clock][:40]), "seconds, hh:mm:ss, or an ISO date and time")
     as_clock = sheet.dialect.number(cells[0][clock]) is None
+    if as_clock and one.assumed in said:
+        said.remove(one.assumed)
     times = stamps(
         [c[clock] for c in cells],
         np.array(raw, dtype=float),

@@ -125,7 +125,7 @@ def stamps(cells: list[str], raw: Array, factor: float, path: str, rows: list[in
             place = f"{path}, row {rows[int(same[0]) + 1]}, column {column}"
             text = "a time a row: stamps with more digits, or an even clock, or one row a time"
             raise InputError(place, f"{same.size} stamps repeat, first {cells[same[0] + 1]}", text)
-        raw = even[0] + even[1] * np.arange(raw.size)
+        raw = np.asarray(even[0] + even[1] * np.arange(raw.size, dtype=float))
         sigma = even[1] * 0.05
         said.append(
             f"{column}: {same.size} stamps repeat (printed with too few digits); "
