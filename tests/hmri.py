@@ -1,4 +1,4 @@
-"""KVLCC2 captive tests of HMRI as run tables: small adapters, the data stay outside the project."""
+"""KVLCC2 captive tests of HMRI as run tables: small adapters to the extracts in ``data/published``."""
 
 from __future__ import annotations
 
@@ -6,18 +6,15 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-import pytest
 
 from ident.captive.run_table import run_table
 from ident.checks.findings import Body
 
-DATASETS = Path(__file__).parents[2] / "shared" / "datasets"
-HMRI = DATASETS / "kvlcc2_hmri_pmm"
+DATASETS = Path(__file__).parent / "data" / "published"
+HMRI = DATASETS / "hmri"
 # channel_definitions.txt: Lpp 6.893 m at scale 46.426, mass 3123 kg, Izz 9516 kg m2; d = 0.448 m
 # is the ship's 20.8 m at that scale.
 KVLCC2 = Body(6.8926, 1000.0, 3123.0, (float("nan"), float("nan"), 9516.0), 0.448, "channel_definitions.txt")
-
-needs_datasets = pytest.mark.skipif(not HMRI.is_dir(), reason="needs ../shared/datasets")
 
 
 def sheet(name: str, test: str, loads: dict[str, str]) -> pd.DataFrame:

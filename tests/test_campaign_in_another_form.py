@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from made_campaigns import campaign
-from test_campaign_conversions import BB2, assert_same, header, number, rewritten, text
+from rewritten_campaigns import BB2, assert_same, header, number, rewritten, text
 
 from ident.captive.campaign import read_campaign
 from sim.files.errors import InputError

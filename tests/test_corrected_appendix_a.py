@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 ROOT = Path(__file__).parents[1]
-SHARED = Path(__file__).parents[2] / "shared"
+PUBLISHED = Path(__file__).parent / "data" / "published" / "bb2"
 RHO, L, D = 1025.0, 70.2, 5.0
 KTS10, KTS3 = 5.14444, 1.54333
 SIGN = {"X": -1.0, "Y": 1.0, "Z": -1.0, "K": -1.0, "M": 1.0, "N": -1.0}
@@ -320,10 +320,7 @@ def test_eq48_wake_fraction_by_hand(raw, look):
 
 
 def _published(coefficient, angle):
-    path = SHARED / "bb2" / "published_coefficients.csv"
-    if not path.is_file():
-        pytest.skip("the published coefficient tables are not beside this checkout")
-    with path.open(encoding="utf-8", newline="") as stream:
+    with (PUBLISHED / "published_coefficients.csv").open(encoding="utf-8", newline="") as stream:
         found = [r for r in csv.DictReader(stream) if r["coefficient"] == coefficient]
     deep = [r for r in found if r["speed_kts"] == "10" and r["D0_m"] == "23.6900" and r[angle]]
     return {float(r[angle]): float(r["value_half_rho_best"]) for r in deep}

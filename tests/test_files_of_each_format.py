@@ -30,6 +30,7 @@ from made_campaigns import (
     read,
     tidy,
 )
+from made_files import MAP, PATTERNS, PLAIN, ROWS, STAR, body
 
 from ident.captive.campaign import read_campaign
 from ident.captive.quantities import factor, table
@@ -38,17 +39,6 @@ from ident.cli import main
 from ident.database.store import database_rows
 from ident.identification.identify import identify
 from sim.files.errors import InputError
-
-
-def body(form, delimiter: str = ",") -> str:
-    return "".join(
-        delimiter.join(form(v) for v in (b, *row)) + "\n"
-        for b, row in zip(BETA, (VALUES / [1e3, 1.0, 1e3]).tolist(), strict=True)
-    )
-
-
-PLAIN = "beta_deg,Fx [kN],Y [N],Mz (kN m)\n" + body(repr)
-MAP = 'Fx = "X"\n"Mz (kN m)" = "N"'
 
 
 @pytest.mark.parametrize(
@@ -173,21 +163,6 @@ def test_the_table_of_quantities_agrees_with_pint():
 
 # -- time histories --------------------------------------------------------------------------
 
-STAR = (
-    '"Iteration","Physical Time: Physical Time (s)","Drag Monitor: Drag Monitor (N)",'
-    '"Side force Monitor: Force (kN)","Yaw Monitor: Moment (N-m)","Continuity Monitor: Residual"\n'
-    + "".join(
-        f"{i},{t!r},{x!r},{y / 1e3!r},{n!r},1e-5\n"
-        for i, (t, x, y, n) in enumerate(SAMPLES)
-    )
-)  # fmt: skip
-PATTERNS = r"""[source.patterns]
-'^Physical Time:' = "time"
-'^Drag Monitor: .*\((N)\)' = "X"
-'^Side force Monitor:' = "Y"
-'^Yaw Monitor: ' = "N [N m]"
-"""
-
 
 def test_star_ccm_monitors_by_pattern(tmp_path):
     text = STAR.replace("(N-m)", "")
@@ -209,7 +184,6 @@ def test_star_ccm_patterns_that_do_not_fit_are_refused(tmp_path, patterns, words
     assert words in str(caught.value)
 
 
-ROWS = "".join(f"  {t:8.4f}   {x:14.8e}  {y:14.8e}\t{n:14.8e}\n" for t, x, y, n in SAMPLES)
 NAMES = 'names = ["time [s]", "X [N]", "Y [N]", "N [N m]"]'
 
 

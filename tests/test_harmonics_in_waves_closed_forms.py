@@ -24,7 +24,7 @@ from sim.flight.case import load_case
 from sim.waves.linear import kinematics, make_waves, regular
 
 RHO, G = 1025.0, 9.81
-REFERENCE = Path(__file__).parents[2] / "shared" / "bb2" / "maneuvers" / "waves_ss5.csv"
+REFERENCE = Path(__file__).parent / "data" / "published" / "bb2" / "waves_ss5.csv"
 AMPLITUDES, PHASES = (0.4, 0.05, 0.01), (0.7, -1.1, 2.0)
 
 
@@ -194,7 +194,6 @@ def test_encounter_does_not_depend_on_where_time_begins():
 CASES = ("ss5-2.5m", "ss5-23.69m")
 
 
-@pytest.mark.skipif(not REFERENCE.is_file(), reason="needs the digitised harmonics of SS5")
 @pytest.mark.parametrize("name", CASES)
 def test_published_harmonics_of_the_cases_are_those_of_the_figure(name):
     """Values and reading errors as digitised from Kim et al. (2021), Fig. 22."""

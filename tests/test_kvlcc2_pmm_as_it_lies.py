@@ -20,7 +20,7 @@ DATA = Path(__file__).parents[2] / "shared" / "datasets"
 HMRI = DATA / "kvlcc2_hmri_pmm"
 OURS = Path(__file__).parent / "data" / "kvlcc2"
 LENGTH, DRAUGHT, DENSITY, SPEED = 6.893, 0.448, 1000.0, 1.1702
-pytestmark = pytest.mark.skipif(not HMRI.is_dir(), reason="the benchmark's data are not distributed with the program")
+pytestmark = pytest.mark.skipif(not HMRI.is_dir(), reason="the benchmark's sheets are not distributed with the program")
 
 
 @pytest.fixture(scope="module")

@@ -20,10 +20,10 @@ import pandas as pd
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from made_campaigns import STEADY, campaign, history
-from test_files_of_each_format import MAP, PATTERNS, PLAIN, ROWS, STAR, tidy
-from test_openfoam_versions import PARTS, REAL, SOURCE, STATE, VERSIONS
-from test_quality_checks_from_a_campaign_folder import CONFIGURED, ship
+from made_campaigns import STEADY, campaign, history, tidy
+from made_files import MAP, PATTERNS, PLAIN, ROWS, STAR
+from made_openfoam import PARTS, REAL, SOURCE, STATE, VERSIONS
+from made_ship import CONFIGURED, ship
 
 from ident.captive.campaign import read_campaign
 from ident.checks.check import check_campaign

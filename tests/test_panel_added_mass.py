@@ -18,7 +18,7 @@ from sim.hull.mesh import joined
 from sim.hull.surface import Hull, hull_mesh, read_geometry
 
 BB2 = Path(__file__).parents[1] / "sim" / "vehicles" / "bb2"
-PUBLISHED = Path(__file__).parents[1] / ".." / "shared" / "bb2" / "geometry" / "added_mass_vs_depth.csv"
+PUBLISHED = Path(__file__).parent / "data" / "published" / "bb2" / "added_mass_vs_depth.csv"
 HAS_PANELS = importlib.util.find_spec("capytaine") is not None
 panels = pytest.mark.skipif(not HAS_PANELS, reason="the optional extra 'panels' (capytaine) is not installed")
 RHO, G = 1025.0, 9.81
@@ -91,8 +91,6 @@ def test_limits_order_and_depth(tmp_path):
 
 @panels
 def test_depth_ratios_of_bb2_are_the_published_ones():
-    if not PUBLISHED.is_file():
-        pytest.skip("the published depth table is not here")
     table = pd.read_csv(PUBLISHED)
     mesh = read_geometry(BB2 / "geometry.toml", coarser=3.0)
     found = depth_table(mesh, -11.37, [2.5], [0.0, 0.66, np.inf], RHO, G)

@@ -31,7 +31,7 @@ LENGTH, MASS, YAW_INERTIA, GRAVITY = 6.8927, 3123.0, 9516.0, 0.24
 # The print has three decimals.
 LAST_DIGIT = 0.0005
 
-pytestmark = pytest.mark.skipif(not HMRI.exists(), reason="reference data sets not beside the project")
+pytestmark = pytest.mark.skipif(not HMRI.exists(), reason="the benchmark's sheets are not distributed with the program")
 
 
 def _folder(where, edit=lambda text: text, rewrite=lambda name, row: row):

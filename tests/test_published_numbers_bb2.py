@@ -16,18 +16,15 @@ from sim.flight.trim import NoEquilibrium, self_propulsion
 from sim.kernel import rhs as kernel
 from sim.kernel.assemble import added_mass_matrix, assemble, rigid_body_matrix
 
-SHARED = Path(__file__).parents[2] / "shared"
+PUBLISHED = Path(__file__).parent / "data" / "published" / "bb2"
 # Source frame (x aft, z up) to program frame: a turn of 180 deg about y.
 TURN = np.diag([-1.0, 1.0, -1.0, -1.0, 1.0, -1.0])
-# shared/bb2/geometry/added_mass_bem_full.csv, panel method about (32.3287, 0, 0), rho = 1025.
+# data/published/bb2/added_mass_bem_full.csv, panel method about (32.3287, 0, 0), rho = 1025.
 PANEL = {0: 2.181e5, 1: 5.308e6, 2: 3.738e6, 3: 2.640e7, 4: 9.507e8, 5: 1.1048e9}
 
 
-def _shared(name):
-    path = SHARED / "bb2" / "geometry" / name
-    if not path.is_file():
-        pytest.skip(f"shared reference data not beside the project: {name}")
-    return pd.read_csv(path)
+def _published(name):
+    return pd.read_csv(PUBLISHED / name)
 
 
 @pytest.fixture(scope="module")
@@ -46,7 +43,7 @@ def added(coefficients, environment):
 
 def test_the_boats_inertia_is_the_panel_methods(panel):
     """Six digits are given; what port/starboard symmetry makes zero is zero here."""
-    given = TURN @ _shared("added_mass_bem_full.csv").iloc[:, 1:].to_numpy() @ TURN
+    given = TURN @ _published("added_mass_bem_full.csv").iloc[:, 1:].to_numpy() @ TURN
     odd, even = [1, 3, 5], [0, 2, 4]
     for k in (odd, even):
         assert panel[np.ix_(k, k)] == pytest.approx(given[np.ix_(k, k)], rel=2e-5, abs=10.0)
@@ -96,7 +93,7 @@ def test_added_mass_respects_the_port_starboard_symmetry(added):
 
 def test_added_mass_matrix_is_the_one_its_sections_imply(added):
     """Computed apart from this program from Table 6 and its levers; six digits are given."""
-    implied = TURN @ _shared("added_mass_implied_sections.csv").iloc[:, 1:].to_numpy() @ TURN
+    implied = TURN @ _published("added_mass_implied_sections.csv").iloc[:, 1:].to_numpy() @ TURN
     assert added == pytest.approx(implied, rel=2e-5, abs=10.0)
 
 
@@ -152,7 +149,7 @@ def test_small_roll_decay_without_damping_has_that_period(campaign, rows, enviro
 
 def test_roll_period_with_panel_method_inertia_is_the_published_one(campaign, stiffness):
     """12.57 s with BG 0.4298 m and 4440 t (geometry/README.md); measured 12.68 s."""
-    panel = TURN @ _shared("added_mass_bem_full.csv").iloc[:, 1:].to_numpy() @ TURN
+    panel = TURN @ _published("added_mass_bem_full.csv").iloc[:, 1:].to_numpy() @ TURN
     mass = rigid_body_matrix(campaign.vehicle)[0] + 0.5 * (panel + panel.T)
     assert _roll_period(mass, stiffness) == pytest.approx(12.57, abs=0.03)
 

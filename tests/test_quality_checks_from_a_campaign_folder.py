@@ -8,17 +8,17 @@ from __future__ import annotations
 
 import itertools
 import json
-import shutil
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
 from click.testing import CliRunner
-from hmri import STATIC, needs_datasets, sheet
+from hmri import STATIC, sheet
 from hypothesis import given
 from hypothesis import strategies as st
-from made_campaigns import CONSTANTS, HEAD, STEADY, campaign, history
+from made_campaigns import CONSTANTS, STEADY, campaign, history
+from made_ship import CONFIGURED, DENSITY, DERIVATIVES, LENGTH, MMG, ROOT, ship
 
 from ident.captive.campaign import read_campaign
 from ident.captive.run_table import run_table
@@ -29,9 +29,7 @@ from ident.timeseries.clock import Clock
 from sim.boat.vehicle import load_vehicle
 from sim.files.errors import InputError
 
-ROOT = Path(__file__).parents[1]
 SUBOFF = ROOT / "raw_captive_data" / "suboff"
-MMG = ROOT / "tests" / "data" / "kvlcc2" / "kvlcc2.toml"
 
 
 def found(folder: Path, *names: str) -> list:
@@ -171,40 +169,6 @@ def test_a_history_the_campaign_trusts_less_is_information(tmp_path):
 
 # -- tables beside the runs --------------------------------------------------------------
 
-SHIP = {
-    "vehicle": "kvlcc2.toml",
-    "scale": "ratio = 1.0\nlength_m = 6.8927\ndraught_m = 0.448",
-    "frame": 'x = "forward"\ny = "starboard"\nz = "down"\nangles = "flight"',
-}
-DENSITY, LENGTH, SPEED = 1000.0, 6.8927, 1.2
-# 1/2 rho L^2, of the size of a tanker's.
-DERIVATIVES = {"Y_v": -0.020, "N_v": -0.009, "Y_vdot": -0.0147}
-
-
-def ship(folder: Path, factor: float = 1.0, tables: str = "", reference: str = "") -> Path:
-    """Drift and acceleration tests with dimensionless loads, ``factor`` times too large."""
-    folder.mkdir()
-    shutil.copy(MMG, folder)
-    rows = []
-    for beta in (-8.0, -6.0, -4.0, -2.0, 2.0, 4.0, 6.0, 8.0):
-        v = np.sin(np.radians(beta))
-        loads = [DERIVATIVES["Y_v"] * v, DERIVATIVES["N_v"] * v]
-        rows.append((f"D{beta:g}", "drift_horizontal", beta, 0.0, *(factor * x for x in loads)))
-    for vdot in (-0.2, -0.1, 0.1, 0.2):
-        rows.append((f"A{vdot:g}", "acceleration", 0.0, vdot, factor * DERIVATIVES["Y_vdot"] * vdot, 0.0))
-    text = "run_id,test,beta [deg],vdot [-],Y [-],N [-]\n"
-    text += "".join(",".join(str(x) if isinstance(x, str) else f"{x:.9g}" for x in row) + "\n" for row in rows)
-    (folder / "runs.csv").write_text(text)
-    source = '[[source]]\nfiles = "runs.csv"\nnormalisation = "half_rho_L2"\n[source.constants]\npart = "hull"\n'
-    source += f'quality = "ok"\nU = "{SPEED} m/s"\nalpha = "0 deg"\nD0 = "0 m"\nrel_sigma = 0.03\n'
-    more = {"tables": tables} if tables else {}
-    campaign(folder, source, **{k: v for k, v in SHIP.items() if k != "vehicle"}, **more)
-    path = folder / "campaign.toml"
-    path.write_text(path.read_text().replace(HEAD, HEAD.replace('"bb2"', '"kvlcc2.toml"')))
-    if reference:
-        (folder / "printed.csv").write_text(reference)
-    return folder
-
 
 def test_loads_in_the_other_norm_than_the_campaign_says(tmp_path):
     step = LENGTH / 0.448
@@ -238,9 +202,6 @@ def test_a_printed_value_out_of_all_range_is_no_other_norm(tmp_path):
     other = pd.DataFrame({"coefficient": ["Y_v"], "value": [1e10]})
     body = Body(LENGTH, DENSITY, 3123.0, None, 0.448)
     assert not checked(Evidence(derivatives=tiny, reference=other, body=body), "norm")
-
-
-CONFIGURED = "configuration,appendages\nConfig 3,hull+sail\nA,hull\nB,hull+sail\n"
 
 
 @pytest.mark.parametrize("declared", [True, False])
@@ -333,7 +294,6 @@ def test_a_side_force_at_zero_rudder_is_still_a_fault():
     assert only.rows == (4,)
 
 
-@needs_datasets
 @pytest.mark.parametrize("name", ["static_rudder_test.csv", "static_drift_and_rudder_test.csv"])
 def test_rudder_sheets_of_a_ship_without_planes(name):
     """HMRI: rudder beside the hull in one column, whatever sense it has."""
