@@ -113,10 +113,13 @@ _MAY_BE_ABSENT = (
 )
 
 
-def pytest_runtest_logreport(report):
-    """Where changes are gated, a test that is left out for a reason not listed fails the run."""
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(item, call):
+    """Where changes are gated, a test that is left out for a reason not listed fails."""
+    report = yield
     if report.skipped and os.environ.get("CI") and not hasattr(report, "wasxfail"):
-        reason = report.longrepr[2] if isinstance(report.longrepr, tuple) else str(report.longrepr)
+        reason = str(call.excinfo.value) if call.excinfo else ""
         if not any(text in reason for text in _MAY_BE_ABSENT):
             report.outcome = "failed"
-            report.longrepr = f"left out without a listed reason (tests/conftest.py): {reason}"
+            report.longrepr = f"{item.nodeid}: left out without a reason listed in tests/conftest.py: {reason}"
+    return report
