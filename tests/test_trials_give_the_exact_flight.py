@@ -209,3 +209,91 @@ def test_contract_of_the_command(tmp_path):
     assert found["maneuver"] == "zigzag 20/20"
     assert set(found["metrics"]["overshoot_1_deg"]) == {"value", "sigma", "unit"}
     assert found["metrics"]["execute_2_s"]["unit"] == "s"
+
+
+def test_turn_after_an_approach_on_another_course(tmp_path):
+    one = turn()
+    before = np.arange(0.0, 90.0, 0.5)
+    speed = float(one["speed"][0])
+    x = np.concatenate([speed * before, 90.0 * speed + one["x"]])
+    y = np.concatenate([0.0 * before, one["y"]])
+    north, east = turned(x, y, 200.0, (1000.0, -3000.0))
+    rudder = np.concatenate([0.0 * before, np.full(one["t"].size, 20.0)])
+    record = {"time [s]": np.concatenate([before, 90.0 + one["t"]]), "x_north [m]": noisy(north, 0.5)}
+    record |= {"y_east [m]": noisy(east, 0.5, 1)}
+    record["heading [deg]"] = np.mod(noisy(np.concatenate([0.0 * before, one["psi"]]), 0.2, 2) + 200.0, 360.0)
+    done = held(write(tmp_path / "without.csv", record), truth()["turn"])
+    assert done.metrics["time_90_heading_s"].sigma > 0.3, "without a rudder the execute is not known to a sample"
+    done = held(write(tmp_path / "with.csv", record | {"rudder [deg]": rudder}), truth()["turn"])
+    assert done.metrics["time_90_heading_s"].sigma < 0.2
+    assert str(done.maneuver) == "turning_circle 20"
+
+
+@pytest.mark.parametrize(
+    ("header", "stamp"),
+    [
+        ("t [ms]", lambda t: f"{1000 * t:.1f}"),
+        ("time [s]", lambda t: f"{1.7e9 + t:.2f}"),
+        ("time [min]", lambda t: f"{t / 60:.6f}"),
+        ("Timestamp", lambda t: f"2024-05-01T09:{int(t // 60):02d}:{t % 60:06.3f}Z"),
+    ],
+    ids=["milliseconds", "epoch", "minutes", "ISO"],
+)
+def test_clocks_of_recorders(tmp_path, header, stamp):
+    one = zigzag()
+    lines = [header + ";psi [deg]", *[f"{stamp(t)};{psi:.4f}" for t, psi in zip(one["t"], one["psi"], strict=True)]]
+    (tmp_path / "zz.csv").write_text("\n".join(lines), encoding="utf-8")
+    held(tmp_path / "zz.csv", truth()["zigzag"])
+
+
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("title.csv", "Trial 12\nDate 1.5.2024\ntime [s],psi [deg],delta [deg]\n"),
+        ("units.csv", "TIME,PSI,DELTA\n[s],[deg],[deg]\n"),
+        ("words.csv", "Time / s,Heading / deg,Rudder / deg\n"),
+        ("suffix.csv", "time_s,psi_deg,dH_deg\n"),
+        ("columns.dat", "# 20/20 zigzag\n# t[s]  psi[deg]  delta[deg]\n"),
+    ],
+)
+def test_headers_of_recorders(tmp_path, name, text):
+    one = zigzag()
+    mark = "  " if name.endswith(".dat") else ","
+    rows = [mark.join(f"{v:.4f}" for v in row) for row in zip(one["t"], one["psi"], one["dH"], strict=True)]
+    (tmp_path / name).write_text(text + "\n".join(rows), encoding="utf-8")
+    done = held(tmp_path / name, truth()["zigzag"])
+    assert str(done.maneuver) == "zigzag 20/20"
+
+
+def test_positions_less_often_than_headings_and_degrees_with_minutes(tmp_path):
+    one = turn()
+    lines = ["time [s],north [m],east [m],psi [deg]"]
+    for i, (t, x, y, psi) in enumerate(zip(one["t"], one["x"], one["y"], one["psi"], strict=True)):
+        place = f"{x:.3f},{y:.3f}" if i % 4 == 0 else ","
+        lines.append(f"{t},{place},{psi:.3f}")
+    (tmp_path / "tc.csv").write_text("\n".join(lines), encoding="utf-8")
+    held(tmp_path / "tc.csv", truth()["turn"])
+    decimal = ["time [s],lat,lon", "0,43.102250,5.898403", "1,43.102300,5.898403", "2,43.102350,5.898403"]
+    minutes = ["time [s],lat,lon", "0,43°06.135000'N,5°53.90418'E", "1,43°06.138000'N,5°53.90418'E"]
+    from ident.trials.reading import read_recording
+
+    for name, rows in (("a.csv", decimal), ("b.csv", minutes)):
+        (tmp_path / name).write_text("\n".join(rows), encoding="utf-8")
+    found = [read_recording(tmp_path / n, TrialFile()).channels["lat"].value[:2] for n in ("a.csv", "b.csv")]
+    np.testing.assert_allclose(found[0], found[1], rtol=0.0, atol=1e-12)
+
+
+def test_folder_of_runs_gives_scatter_and_port_against_starboard(tmp_path):
+    one = zigzag()
+    for seed in range(3):
+        psi = noisy(one["psi"], 0.2, seed)
+        write(tmp_path / f"port{seed}.csv", {"t [s]": one["t"], "psi [deg]": psi, "dH [deg]": one["dH"]})
+        write(tmp_path / f"starboard{seed}.csv", {"t [s]": one["t"], "psi [deg]": -psi - 30, "dH [deg]": -one["dH"]})
+    done = CliRunner().invoke(main, ["trial", str(tmp_path), "--json", "-"])
+    assert done.exit_code == 0, done.output
+    rows = {(r["side"], r["metric"]): r for r in json.loads(done.output)["scatter"]}
+    port = rows["port", "overshoot_1_deg"]
+    assert port["runs"] == 3
+    assert 0.2 < port["scatter"] / port["stated"] < 3.0
+    gap = port["port_less_starboard"]
+    assert abs(gap["value"]) < 3.0 * gap["sigma"]

@@ -74,11 +74,11 @@ class SmoothPath:
         """The most likely path, or its derivative, at some times [s]."""
         return np.asarray(BSpline(self.knots, self.mean, _DEGREE)(time, derivative))
 
-    def draws(self, time: Array, count: int, rng: np.random.Generator, derivative: int = 0) -> Array:
-        """(count, times) paths drawn from the posterior."""
+    def drawn(self, count: int, rng: np.random.Generator) -> list[SmoothPath]:
+        """Paths drawn from the posterior."""
         normal = rng.standard_normal((self.mean.size, count))
         away = solve_banded((0, len(self.factor) - 1), self.factor, normal)
-        return np.asarray(BSpline(self.knots, self.mean[:, None] + away, _DEGREE)(time, derivative).T)
+        return [replace(self, mean=self.mean + one) for one in away.T]
 
     def again(self) -> SmoothPath:
         """This path smoothed once more as its samples were: the difference is the bias of smoothing."""

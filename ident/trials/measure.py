@@ -87,23 +87,19 @@ def _draws(paths: dict[str, SmoothPath], grid: Array, start: Start, count: int, 
     rng = np.random.default_rng(seed)
     moved = start.time_sigma * rng.standard_normal(count)
     base = None if start.angle is None else start.angle + start.angle_sigma * rng.standard_normal(count)
-    values, rates = {}, {}
-    for name, path in paths.items():
-        state = rng.bit_generator.state
-        values[name] = path.draws(grid, count, rng)
-        # The same draws, differentiated.
-        again = np.random.default_rng()
-        again.bit_generator.state = state
-        rates[name] = path.draws(grid, count, again, 1)
-    return [
-        Drawn(
-            grid - moved[i],
-            {k: v[i] for k, v in values.items()},
-            {k: v[i] for k, v in rates.items()},
-            None if base is None else float(base[i]),
-        )
-        for i in range(count)
-    ]
+    drawn = {name: path.drawn(count, rng) for name, path in paths.items()}
+    found = []
+    for i in range(count):
+        one = {name: d[i] for name, d in drawn.items()}
+        at = np.clip(grid + moved[i], *_range(one)) if moved[i] else grid
+        values, rates = {k: p(at) for k, p in one.items()}, {k: p(at, 1) for k, p in one.items()}
+        found.append(Drawn(at - moved[i], values, rates, None if base is None else float(base[i])))
+    return found
+
+
+def _range(paths: dict[str, SmoothPath]) -> tuple[float, float]:
+    """Times that every path has."""
+    return max(float(p.knots[4]) for p in paths.values()), min(float(p.knots[-5]) for p in paths.values())
 
 
 def _angle(one: Drawn, name: str) -> Array:
@@ -311,7 +307,7 @@ def measured(
     InputError
         When the record lacks a channel that the maneuver is measured on.
     """
-    end = min(float(p.knots[-5]) for p in paths.values())
+    end = _range(paths)[1]
     grid = _grid(start.time, end)
     likely = _most_likely(paths, grid, start)
     measure = _estimator(one, maneuver, start, spec, likely)

@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ident.captive.quantities import is_unit
+from ident.captive.quantities import is_unit, split
 from ident.captive.readers.opening import open_sheet, reader_of
 from ident.captive.readers.table import Sheet
-from ident.captive.readers.text import head
+from ident.captive.readers.text import COMMENTS, head
 from ident.captive.source import Source
 from ident.checks.findings import Finding
 from ident.trials.channels import Meaning, channel_of, meaning, plain
@@ -25,7 +25,12 @@ from sim.files.record import Record
 Array = NDArray[np.float64]
 _MOST_ROWS = 2_000_000
 _LONG = ("channel", "value", "unit")
+# A header stands within the first lines.
+_TITLES = 100
 _TIMES = ("t", "time", "time s", "t s")
+_DEGREES = re.compile(
+    r"""(\d+(?:\.\d+)?)\s*[°d\s]\s*(\d+(?:\.\d+)?)?\s*['′\s]?\s*(\d+(?:\.\d+)?)?\s*["″]?\s*([NSEWnsew])"""
+)
 _BLANK = ("", "nan", "na", "n/a", "-", "--", "null", "none", "inf")
 
 
@@ -64,17 +69,35 @@ class Recording:
 
 
 def _source(path: Path, spec: TrialFile) -> Source:
-    """How the file is to be opened; a header in front of white-space columns is found."""
+    """How the file is to be opened; a header below titles, or in front of white-space columns, is found."""
     given = {k: getattr(spec, k) for k in ("delimiter", "decimal", "encoding", "header_pattern", "skip", "units_row")}
     source = Source(files=path.name, **given)
-    if spec.header_pattern or reader_of(path, source) != "columns":
+    if spec.header_pattern or reader_of(path, source) not in ("table", "columns"):
         return source
-    first = head(path, source.encoding, (), source.skip)
-    named = [t for t in first.text if sum(bool(channel_of(w)) for w in re.split(r"[\s\[\](),;]+", t)) >= 2]
+    columns = reader_of(path, source) == "columns"
+    lines = head(path, source.encoding, (), source.skip).text
+    mark = next((m for m in (";", "\t", ",") if not columns and any(m in t for t in lines[:_TITLES])), None)
+    named = [i for i, line in enumerate(lines[:_TITLES]) if _names(line, mark) >= 2]
+    if not columns:
+        at = next((i for i in named if not lines[i].lstrip().startswith(COMMENTS)), 0)
+        above = [t for t in lines[:at] if not t.lstrip().startswith(COMMENTS) and not t.startswith("sep=")]
+        if not above:
+            return source
+        return source.model_copy(update={"header_pattern": _exactly(lines[at]), "delimiter": mark})
     if not named:
         allowed = "a header with the names of the columns, or header_pattern in trial.toml"
         raise InputError(str(path), "columns without a header that names channels", allowed)
-    return source.model_copy(update={"header_pattern": "^" + re.escape(named[-1]) + "$"})
+    return source.model_copy(update={"header_pattern": _exactly(lines[named[-1]])})
+
+
+def _names(line: str, mark: str | None) -> int:
+    """How many cells of a line name a channel."""
+    cells = line.split(mark) if mark else re.split(r"[\s\[\](),;]+", line)
+    return sum(bool(channel_of(split(c.strip(' "#'))[0]) or channel_of(c.strip(' "#'))) for c in cells)
+
+
+def _exactly(line: str) -> str:
+    return "^" + re.escape(line) + "$"
 
 
 def _cells(sheet: Sheet) -> tuple[list[int], list[list[str]]]:
@@ -191,11 +214,23 @@ def _wide(
     )
 
 
+def _position(cell: str) -> float | None:
+    """Degrees of ``43°06.135'N`` or ``43 06 08.1 N``, negative to the south and west."""
+    found = _DEGREES.fullmatch(cell.strip().replace(",", "."))
+    if not found:
+        return None
+    minutes, seconds = float(found[2] or 0.0), float(found[3] or 0.0)
+    size = float(found[1]) + minutes / 60.0 + seconds / 3600.0
+    return -size if found[4].upper() in "SW" else size
+
+
 def _numbers(sheet: Sheet, rows: list[int], cells: list[list[str]], column: int, what: Meaning) -> Array:
     """A column as numbers; NaN where a cell is blank."""
     out = np.full(len(cells), np.nan)
     for k, one in enumerate(cells):
         value = sheet.dialect.number(one[column])
+        if value is None and what.channel in ("lat", "lon"):
+            value = _position(one[column])
         if value is not None:
             out[k] = value
         elif one[column].strip().lower() not in _BLANK:
