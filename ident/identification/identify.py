@@ -20,6 +20,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from ident.captive.campaign import Campaign, tests
+from ident.identification.equations import Runs
 from ident.identification.nodes import Node, table_points
 from ident.identification.solver import Solver, check_levers
 from ident.identification.wake import wake_fraction
@@ -89,11 +90,11 @@ def identify(campaign: Campaign) -> Identification:
     solver = Solver(campaign)
     check_levers(solver)
     stages = tests()["stage"]
+    runs = Runs.of(campaign.runs)
+    at = campaign.runs["test"].map(stages).to_numpy()
     for stage in sorted(stages.unique()):
-        runs = campaign.runs[campaign.runs["test"].map(stages) == stage]
-        first = len(solver.nodes)
-        equations = [e for _, run in runs.iterrows() for e in solver.equations(run)]
-        solver.solve(equations, first)
+        rows, first = np.flatnonzero(at == stage), len(solver.nodes)
+        solver.solve(runs, solver.equations(runs, rows), first)
         solver.tables.clear()
-        _propulsion_point(solver, runs)
+        _propulsion_point(solver, campaign.runs.iloc[rows])
     return Identification(campaign, solver.nodes, solver.values, solver.covariance, solver.unused, solver.warnings)

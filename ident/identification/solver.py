@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
 from ident.captive.campaign import Campaign
 from ident.captive.published import TEST as PUBLISHED
 from ident.captive.run_table import MEASURED
+from ident.identification.equations import ALWAYS, BEYOND, NONZERO, Equations, Form, Note, Runs
 from ident.identification.nodes import Node, key_point, table_points
-from ident.identification.stage_solve import gain_matrix, weights
+from ident.identification.stage_solve import solve_stage
 from sim.boat.catalogue import ACCELERATIONS, OUTPUTS, Term
 from sim.boat.forces import axis_values, boat_features, body_velocity, multiplier, plane_features
 from sim.boat.parts import Mirror, Point, mirror_of, parts_of, vehicle_terms
@@ -24,18 +25,6 @@ Key = tuple[str, str]
 
 # Relative to the length: levers closer than this are the same lever, rounded.
 _LEVER_DIGITS = 1e-5
-
-
-@dataclass
-class Equation:
-    """One measured load (or directly measured coefficient) of one run."""
-
-    run: pd.Series
-    output: str
-    value: float
-    sigma: float
-    unknowns: dict[int, float]
-    known: dict[int, float]
 
 
 class Solver:
@@ -118,19 +107,18 @@ class Solver:
 
     # -- equations -----------------------------------------------------------------------
 
-    def features(self, run: pd.Series) -> dict[str, float]:
+    def features(self, run: Mapping[str, Any]) -> dict[str, float]:
         """Feature values of a run's state."""
-        zero = {k: 0.0 if pd.isna(run[k]) else float(run[k]) for k in ("U", "alpha", "beta", "p", "q", "r", "plane")}
+        given = {k: float(run[k]) for k in ("U", "alpha", "beta", "p", "q", "r", "plane", *ACCELERATIONS)}
+        zero = {k: 0.0 if math.isnan(x) else x for k, x in given.items()}
         velocity = body_velocity(zero["U"], zero["alpha"], zero["beta"])
         rates = (zero["p"], zero["q"], zero["r"])
         found = boat_features(velocity, rates, float(run["D0"]), float(run["n"]), float(run["J"]))
         if run["part"] in self.planes:
             found |= plane_features(self.planes[run["part"]], velocity, rates, zero["plane"])
-        for name in ACCELERATIONS:
-            found[name] = 0.0 if pd.isna(run[name]) else float(run[name])
-        return found
+        return found | {name: zero[name] for name in ACCELERATIONS}
 
-    def active(self, run: pd.Series, output: str, features: dict[str, float]) -> list[tuple[Term, float]]:
+    def active(self, run: Mapping[str, Any], output: str, features: dict[str, float]) -> list[tuple[Term, float]]:
         """Terms of the run's part that load this output in this state."""
         found = []
         for term in self.loading.get((output, run["part"]), []):
@@ -139,14 +127,13 @@ class Solver:
                 found.append((term, m))
         return found
 
-    def skip(self, run: pd.Series, output: str, reason: str) -> None:
+    def skip(self, run: Mapping[str, Any], output: str, reason: str) -> None:
         """Note that a load of a run is not used, and why."""
         self.unused.append((run["run_id"], run["file"], int(run["row"]), output, reason))
 
-    def load_equation(self, run: pd.Series, output: str, features: dict[str, float]) -> Equation | None:
-        """One load of a run: terms its test identifies are unknown, the others known."""
-        unknowns: dict[int, float] = {}
-        known: dict[int, float] = {}
+    def load_form(self, run: Mapping[str, Any], output: str, features: dict[str, float]) -> tuple[Form, list[Note]]:
+        """One load of a state: terms its test identifies are unknown, the others known."""
+        form, notes = Form(output, {}, {}), []
         zero_by_symmetry = False
         for term, m in self.active(run, output, features):
             factor = self.scales[term.name] * m
@@ -158,112 +145,143 @@ class Solver:
                     continue
                 node = self.node(key)
                 self.nodes[node].seen.add((run["part"], point))
-                unknowns[node] = unknowns.get(node, 0.0) + sign * factor
+                form.unknowns[node] = form.unknowns.get(node, 0.0) + sign * factor
             elif run["decoupled"] != "True":
                 row = self.row(term, run["part"], features)
                 if row is None and self.canonical(term.name, run["part"], self.place(term, features))[1] == 0:
                     continue
                 if row is None:
                     text = f"{term.name} acts on this run but no test identifies it: not subtracted"
-                    self.warnings.append((run["run_id"], text))
+                    notes.append(Note(output, text, unused=False))
                     continue
                 for node, weight in row.items():
-                    known[node] = known.get(node, 0.0) + factor * weight
-        value, sigma = float(run[output]), float(run[f"s_{output}"])
-        if unknowns:
-            return Equation(run, output, value, sigma, unknowns, known)
-        if zero_by_symmetry:
-            if abs(value) > 2.0 * sigma and value != 0.0:
-                text = f"{output} = {value:g} where port/starboard symmetry makes it zero"
-                self.warnings.append((run["run_id"], text))
-        elif value != 0.0:
-            self.skip(run, output, f"no term that {run['test']} identifies acts on this load in this state")
-        return None
+                    form.known[node] = form.known.get(node, 0.0) + factor * weight
+        if not form.unknowns and zero_by_symmetry:
+            text = f"{output} = {{value:g}} where port/starboard symmetry makes it zero"
+            notes.append(Note(output, text, unused=False, when=BEYOND))
+        elif not form.unknowns:
+            text = f"no term that {run['test']} identifies acts on this load in this state"
+            notes.append(Note(output, text, unused=True, when=NONZERO))
+        return form, notes
 
-    def direct_equation(self, run: pd.Series, output: str, features: dict[str, float]) -> Equation | None:
+    def direct_form(self, run: Mapping[str, Any], output: str, features: dict[str, float]) -> tuple[Form, list[Note]]:
         """A coefficient given as it is: of a propeller test, or published."""
         published = run["test"] == PUBLISHED
         term = self.by_name[run["coefficient"] if published else output]
         if not published and run["test"] not in term.tests:
-            self.skip(run, output, f"{output} is not taken from a {run['test']} run")
-            return None
+            return Form(output, {}, {}), [Note(output, f"{output} is not taken from a {run['test']} run", unused=True)]
         part = run["part"] if published else term.part
         key, sign = self.canonical(term.name, part, self.place(term, features))
         if published and sign == 0:
-            self.skip(run, output, f"{term.name} is zero by port/starboard symmetry")
-            return None
+            return Form(output, {}, {}), [Note(output, f"{term.name} is zero by port/starboard symmetry", unused=True)]
         if not published:
             # A propeller turns one way: the mirror does not hold for it.
             sign = 1
         node = self.node(key)
         self.nodes[node].seen.add((part, key[2]))
-        return Equation(run, output, float(run[output]), float(run[f"s_{output}"]), {node: float(sign)}, {})
+        return Form(output, {node: float(sign)}, {}), []
 
-    def equations(self, run: pd.Series) -> list[Equation]:
-        """Every usable load and directly measured coefficient of a run."""
+    def forms(self, run: Mapping[str, Any]) -> tuple[list[Form], list[Note]]:
+        """Every usable load and directly measured coefficient of a state, and what is to be said of the others.
+
+        Parameters
+        ----------
+        run : The first run of the state.
+        """
         features = self.features(run)
         excluded = run["exclude"].split()
-        found = []
+        forms: list[Form] = []
+        notes: list[Note] = []
         for output in MEASURED:
-            if pd.isna(run[output]):
+            if math.isnan(run[output]):
                 continue
             if output in excluded:
-                self.skip(run, output, run["reason"] or "excluded in the run file")
+                notes.append(Note(output, run["reason"] or "excluded in the run file", unused=True))
                 continue
-            if output in OUTPUTS:
-                equation = self.load_equation(run, output, features)
-            else:
-                equation = self.direct_equation(run, output, features)
-            if equation:
-                found.append(equation)
-        return found
+            make = self.load_form if output in OUTPUTS else self.direct_form
+            form, own = make(run, output, features)
+            forms += [form] if form.unknowns else []
+            notes += own
+        return forms, notes
+
+    def equations(self, runs: Runs, rows: NDArray[np.int64]) -> Equations:
+        """The equations of some runs; nodes are entered as they come, and loads left out are noted.
+
+        Parameters
+        ----------
+        runs : All of the campaign.
+        rows : Those of a stage, rows of the run table in rising order.
+        """
+        states, at = np.unique(runs.state[rows], return_index=True)
+        order = np.argsort(at)
+        forms: list[Form] = []
+        notes: dict[int, list[Note]] = {}
+        number = np.full((len(runs.first), len(MEASURED)), -1)
+        for state, run in runs.records(states[order]):
+            own, said = self.forms(run)
+            number[state, [MEASURED.index(f.output) for f in own]] = np.arange(len(forms), len(forms) + len(own))
+            forms += own
+            if said:
+                notes[state] = said
+        self._note(runs, rows, notes)
+        grid = number[runs.state[rows]]
+        place, output = np.nonzero(grid >= 0)
+        run = rows[place]
+        return Equations(forms, grid[place, output], run, output, runs.value[run, output], runs.sigma[run, output])
+
+    def _note(self, runs: Runs, rows: NDArray[np.int64], notes: dict[int, list[Note]]) -> None:
+        """Say of every run what its state gives occasion to."""
+        said = np.zeros(len(runs.first), dtype=bool)
+        said[list(notes)] = True
+        names, files, places = (runs.words(c) for c in ("run_id", "file", "row"))
+        for row in rows[said[runs.state[rows]]].tolist():
+            for note in notes[int(runs.state[row])]:
+                at = MEASURED.index(note.output)
+                value, sigma = float(runs.value[row, at]), float(runs.sigma[row, at])
+                if note.when != ALWAYS and (value == 0.0 or (note.when == BEYOND and not abs(value) > 2.0 * sigma)):
+                    continue
+                if note.unused:
+                    self.unused.append((names[row], files[row], int(places[row]), note.output, note.text))
+                else:
+                    self.warnings.append((names[row], note.text.replace("{value:g}", f"{value:g}")))
 
     # -- solution ------------------------------------------------------------------------
 
-    def solve(self, equations: list[Equation], first: int) -> None:
+    def solve(self, runs: Runs, equations: Equations, first: int) -> None:
         """Weighted least squares for the nodes from ``first`` on; carries the covariance."""
-        n_new, n_old = len(self.nodes) - first, first
-        if not n_new:
+        if len(self.nodes) == first:
             return
-        a = np.zeros((len(equations), n_new))
-        b = np.zeros((len(equations), n_old))
-        for i, equation in enumerate(equations):
-            for node, factor in equation.unknowns.items():
-                a[i, node - first] = factor
-            for node, factor in equation.known.items():
-                b[i, node] = factor
-        sigma = np.array([e.sigma for e in equations])
-        y = np.array([e.value for e in equations]) - b @ self.values
-        gain, lost = gain_matrix(a, weights(a, sigma))
-        for node in lost:
+        a, b = equations.design(first)
+        sign = np.sign(equations.value)
+        shared = runs.origins()[equations.run] * len(MEASURED) + equations.output
+        found = solve_stage(a, b, equations.value, equations.sigma, sign, shared, self.values, self.covariance)
+        for node in found.lost:
             bad = self.nodes[first + node]
             text = f"{bad.part} at {bad.point}: the runs cannot tell it from other terms; dropped"
             self.warnings.append((bad.name, text))
-        new = gain @ y
-        noise = gain @ _error_covariance(equations, sigma) @ gain.T
-        cross = -gain @ b @ self.covariance
-        own = noise + gain @ b @ self.covariance @ b.T @ gain.T
-        self.covariance = np.block([[self.covariance, cross.T], [cross, own]])
-        self.values = np.concatenate([self.values, new])
-        self._record(equations, y - a @ new, a, gain, sigma)
-        self._forget(first, lost)
+        self.covariance = np.block([[self.covariance, found.cross.T], [found.cross, found.own]])
+        self.values = np.concatenate([self.values, found.values])
+        self._record(runs, equations, found.scores(equations.sigma), first)
+        self._forget(first, found.lost)
 
-    def _record(self, equations: list[Equation], residual: Array, a: Array, gain: Array, sigma: Array) -> None:
-        leverage = np.einsum("ij,ji->i", a, gain)
-        for i, equation in enumerate(equations):
-            spread = sigma[i] * math.sqrt(max(1.0 - leverage[i], 0.0))
-            free = leverage[i] < 1.0 - 1e-9
-            score = abs(residual[i]) / spread if free and spread > 0.0 else 0.0
-            for node in equation.unknowns:
-                record = self.nodes[node]
-                record.runs.append(equation.run["run_id"])
-                record.qualities.append(equation.run["quality"])
-                record.tests.add(equation.run["test"])
-                record.worst = max(record.worst, score)
-            if score > 2.0:
-                name = self.nodes[next(iter(equation.unknowns))].name
-                text = f"{name}: {equation.output} disagrees with runs at the same point by {score:.1f} standard errors"
-                self.warnings.append((equation.run["run_id"], text))
+    def _record(self, runs: Runs, equations: Equations, scores: Array, first: int) -> None:
+        """Enter runs, tests, quality words and the worst disagreement in every node."""
+        a, _ = equations.design(first)
+        order = np.argsort(a.indices, kind="stable")
+        equation = np.repeat(np.arange(len(equations.form)), np.diff(a.indptr))[order]
+        ends = np.searchsorted(a.indices[order], np.arange(a.shape[1] + 1))
+        names, qualities, kinds = (runs.words(c)[equations.run] for c in ("run_id", "quality", "test"))
+        for k, (low, high) in enumerate(zip(ends, ends[1:], strict=False)):
+            own, node = equation[low:high], self.nodes[first + k]
+            node.runs += names[own].tolist()
+            node.qualities += dict.fromkeys(qualities[own].tolist())
+            node.tests |= set(kinds[own].tolist())
+            node.worst = max(node.worst, float(scores[own].max(initial=0.0)))
+        for i in np.flatnonzero(scores > 2.0).tolist():
+            form = equations.forms[equations.form[i]]
+            name = self.nodes[next(iter(form.unknowns))].name
+            text = f"{name}: {form.output} disagrees with runs at the same point by {scores[i]:.1f} standard errors"
+            self.warnings.append((names[i], text))
 
     def _forget(self, first: int, lost: list[int]) -> None:
         """Drop nodes that could not be identified."""
@@ -280,21 +298,6 @@ class Solver:
         self.covariance = np.block([[self.covariance, row[:, None]], [row[None, :], np.array([[variance]])]])
         self.values = np.append(self.values, value)
         return node
-
-
-def _error_covariance(equations: list[Equation], sigma: Array) -> Array:
-    """Measurement covariance: copies of a run share its error, with the sign of the load."""
-    covariance = np.diag(sigma**2)
-    groups: dict[tuple[str, str], list[int]] = {}
-    for i, e in enumerate(equations):
-        groups.setdefault((e.run["copy_of"] or e.run["run_id"], e.output), []).append(i)
-    for members in groups.values():
-        for i in members:
-            for j in members:
-                if i != j:
-                    sign = np.sign(equations[i].value * equations[j].value)
-                    covariance[i, j] = sign * sigma[i] * sigma[j]
-    return covariance
 
 
 def check_levers(solver: Solver) -> None:

@@ -1,19 +1,36 @@
-"""Weighted least squares on sparse, mostly diagonal systems, with what cannot be found."""
+"""Weighted least squares on sparse, mostly diagonal systems, with what cannot be found.
+
+The unknowns are as many as the tables have values; the equations as many as there are loads.
+So nothing here is equations by equations: the operator of each block of unknowns has its
+equations alone, and errors that several loads share enter as one column for each error.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array
+from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import connected_components
 
 Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+# A matrix, full or sparse.
+Matrix = Any
 
 # Singular values below this fraction of the largest do not determine anything.
 _RANK = 1e-9
+# Equations up to which matrices are full. What the equations leave of a value that one run alone
+# gives is rounding, which depends on the order of sums, and stored digests hold it.
+_FULL = 2000
+# An equation with this leverage or more has nothing to be compared with.
+_FREE = 1.0 - 1e-9
 
 
-def weights(a: Array, sigma: Array) -> Array:
+def weights(a: Matrix, sigma: Array) -> Array:
     """Weight of each equation.
 
     Parameters
@@ -25,35 +42,32 @@ def weights(a: Array, sigma: Array) -> Array:
     -------
     1/sigma; an equation without any error outweighs the best of the others.
     """
-    scale = np.abs(a).max(axis=1)
+    scale = abs(a).max(axis=1) if isinstance(a, np.ndarray) else abs(csr_array(a)).max(axis=1).toarray()
     relative = sigma / scale
     positive = relative[relative > 0.0]
     least = 1e-3 * positive.min() if positive.size else 1.0
     return 1.0 / (np.where(relative > 0.0, relative, least) * scale)
 
 
-def gain_matrix(a: Array, weight: Array) -> tuple[Array, list[int]]:
+def gain_matrix(a: Matrix, weight: Array) -> tuple[Matrix, list[int]]:
     """Weighted least-squares operator, solved block by block.
 
     Parameters
     ----------
-    a : (equations, unknowns) design.
+    a : (equations, unknowns) design, full or sparse.
     weight : (equations,) from ``weights``.
 
     Returns
     -------
-    gain : (unknowns, equations), estimate = gain @ measured.
+    gain : (unknowns, equations), estimate = gain @ measured; full or sparse as ``a``.
     lost : Columns that the equations do not determine.
     """
-    n_rows, n_columns = a.shape
-    rows, columns = np.nonzero(a)
-    links = coo_array((np.ones(rows.size), (rows, n_rows + columns)), shape=(n_rows + n_columns,) * 2)
-    _, label = connected_components(links, directed=False)
-    gain = np.zeros((n_columns, n_rows))
+    design = csr_array(a)
+    design.eliminate_zeros()
     lost: list[int] = []
-    for block in np.unique(label[n_rows:]):
-        r, c = np.flatnonzero(label[:n_rows] == block), np.flatnonzero(label[n_rows:] == block)
-        local = a[np.ix_(r, c)] * weight[r, None]
+    found: list[tuple[Indices, Indices, Array]] = []
+    for r, c, local in _blocks(design):
+        local *= weight[r, None]
         size = np.linalg.norm(local, axis=0)
         if not (np.isfinite(local).all() and np.all(size > 0.0)):
             lost += [int(k) for k in c]
@@ -61,8 +75,136 @@ def gain_matrix(a: Array, weight: Array) -> tuple[Array, list[int]]:
         u, s, vt = np.linalg.svd(local / size, full_matrices=False)
         good = s > _RANK * s[0]
         if good.sum() < c.size:
-            null = np.linalg.svd(local / size)[2][good.sum() :]
+            null = _null_space(local / size, int(good.sum()))
             lost += [int(c[k]) for k in range(c.size) if np.abs(null[:, k]).max() > 1e-6]
         inverse = (vt[good].T / s[good]) @ u[:, good].T
-        gain[np.ix_(c, r)] = inverse / size[:, None] * weight[r][None, :]
-    return gain, lost
+        found.append((c, r, inverse / size[:, None] * weight[r][None, :]))
+    return _assembled(found, (design.shape[1], design.shape[0]), isinstance(a, np.ndarray)), lost
+
+
+def _blocks(design: csr_array) -> Iterator[tuple[Indices, Indices, Array]]:
+    """Equations and unknowns that have only to do with one another: rows, columns, and the full part."""
+    n_rows, n_columns = design.shape
+    rows = np.repeat(np.arange(n_rows), np.diff(design.indptr))
+    links = coo_array((np.ones(rows.size), (rows, n_rows + design.indices)), shape=(n_rows + n_columns,) * 2)
+    count, label = connected_components(links, directed=False)
+    members = []
+    for own in (label[:n_rows], label[n_rows:]):
+        order = np.argsort(own, kind="stable")
+        members.append(np.split(order, np.searchsorted(own[order], np.arange(1, count))))
+    place = np.zeros(n_columns, dtype=np.int64)
+    for r, c in zip(*members, strict=True):
+        if c.size:
+            place[c] = np.arange(c.size)
+            part = design[r]
+            local = np.zeros((r.size, c.size))
+            local[np.repeat(np.arange(r.size), np.diff(part.indptr)), place[part.indices]] = part.data
+            yield r, c, local
+
+
+def _null_space(local: Array, rank: int) -> Array:
+    """Combinations of the unknowns that the equations say nothing of, a row each."""
+    square = np.linalg.qr(local, mode="r") if local.shape[0] > local.shape[1] else local
+    return np.linalg.svd(square)[2][rank:]
+
+
+def _assembled(found: list[tuple[Indices, Indices, Array]], shape: tuple[int, int], full: bool) -> Matrix:
+    """The blocks in one matrix."""
+    if full:
+        gain = np.zeros(shape)
+        for c, r, block in found:
+            gain[np.ix_(c, r)] = block
+        return gain
+    if not found:
+        return csr_array(shape)
+    rows = np.concatenate([np.repeat(c, r.size) for c, r, _ in found])
+    columns = np.concatenate([np.tile(r, c.size) for c, r, _ in found])
+    return csr_array((np.concatenate([block.ravel() for *_, block in found]), (rows, columns)), shape=shape)
+
+
+@dataclass(frozen=True)
+class Stage:
+    """What a stage found.
+
+    Attributes
+    ----------
+    values : (new,) coefficients.
+    own : (new, new) their covariance.
+    cross : (new, old) their covariance with the values found before.
+    lost : Those that the equations do not determine.
+    residual : (equations,) what the values leave of each load.
+    leverage : (equations,) share of each load in its own fit.
+    """
+
+    values: Array
+    own: Array
+    cross: Array
+    lost: list[int]
+    residual: Array
+    leverage: Array
+
+    def scores(self, sigma: Array) -> Array:
+        """(equations,) residuals in their own standard errors; zero where nothing else speaks of the load."""
+        spread = sigma * np.sqrt(np.maximum(1.0 - self.leverage, 0.0))
+        compared = (self.leverage < _FREE) & (spread > 0.0)
+        return np.divide(np.abs(self.residual), spread, out=np.zeros(len(sigma)), where=compared)
+
+
+def solve_stage(
+    a: csr_array,
+    b: csr_array,
+    measured: Array,
+    sigma: Array,
+    sign: Array,
+    shared: Indices,
+    values: Array,
+    covariance: Array,
+    full: int = _FULL,
+) -> Stage:
+    """Weighted least squares for the unknowns of a stage, with their covariance.
+
+    measured = a new + b old + error. The estimate weighs every equation by its own error; its
+    covariance has the errors that copies of a run share and those of the values subtracted:
+    with G the operator and E the (equations, errors) matrix of independent errors,
+    cov(new) = G E (G E)' + (G b) C (G b)', cov(new, old) = -(G b) C.
+
+    Parameters
+    ----------
+    a, b : (equations, new) and (equations, old) factors.
+    measured, sigma : (equations,) loads and their standard errors.
+    sign : (equations,) sign with which each load has the error it shares; 0 where it shares none.
+    shared : (equations,) number of the error that each load has.
+    values, covariance : (old,) and (old, old) found before.
+    full : Equations up to which matrices are full.
+
+    Returns
+    -------
+    Stage.
+    """
+    errors = _errors(sigma, sign, shared)
+    design, known = (a.toarray(), b.toarray()) if len(sigma) <= full else (a, b)
+    gain, lost = gain_matrix(design, weights(design, sigma))
+    rest = measured - known @ values
+    new = gain @ rest
+    noise = gain @ errors
+    carried = _full(gain @ known)
+    seen = carried @ covariance
+    leverage = (
+        np.einsum("ij,ji->i", design, gain)
+        if isinstance(design, np.ndarray)
+        else np.asarray(design.multiply(gain.T).sum(axis=1)).ravel()
+    )
+    return Stage(new, _full(noise @ noise.T) + seen @ carried.T, -seen, lost, rest - design @ new, leverage)
+
+
+def _errors(sigma: Array, sign: Array, shared: Indices) -> csr_array:
+    """(equations, errors): independent errors of one standard deviation, and their sign in each load."""
+    number = np.where(sign == 0.0, shared.max(initial=0) + 1 + np.arange(len(sigma)), shared)
+    _, column = np.unique(number, return_inverse=True)
+    size = np.where(sign == 0.0, sigma, sign * sigma)
+    return csr_array((size, (np.arange(len(sigma)), column)), shape=(len(sigma), int(column.max(initial=-1)) + 1))
+
+
+def _full(matrix: Matrix) -> Array:
+    found: Array = matrix if isinstance(matrix, np.ndarray) else matrix.toarray()
+    return found
