@@ -30,7 +30,7 @@ from ident.captive.conversions import (
 )
 from ident.captive.histories import NotRising, Reduced
 from ident.captive.readers.opening import inputs
-from ident.captive.run_table import DIRECT, NUMBERS, run_table
+from ident.captive.run_table import DIRECT, MEASURED, NUMBERS, run_table, sigma
 from ident.captive.runs import Found, source_runs
 from ident.captive.source import Source
 from sim.boat.catalogue import OUTPUTS
@@ -145,9 +145,26 @@ def _refuse(refused: list[NotRising]) -> None:
     raise InputError(first.where, first.found + rest, first.allowed)
 
 
+def _doubtful(runs: pd.DataFrame) -> pd.Series:
+    """True for runs that may lack something: where ``_check_complete`` has to look."""
+    blank = runs.reindex(columns=[*NUMBERS, *(sigma(o) for o in MEASURED)]).isna()
+    found = (runs["run_id"] == "") | blank[list(MEASURED)].all(axis=1)
+    if "U" in runs:
+        found |= runs["U"] < 0
+    for test in runs["test"].unique():
+        for need in str(tests().loc[test, "requires"]).split():
+            quantity = "plane" if need == "delta" else need
+            found |= (runs["test"] == test) & (runs[quantity].isna() if quantity in runs else True)
+    known = {text: set(text.split()) <= set(MEASURED) for text in runs["exclude"].unique()}
+    found |= ~runs["exclude"].map(known).astype(bool)
+    for output in MEASURED:
+        found |= blank["rel_sigma"] & ~blank[output] & blank[sigma(output)]
+    return found
+
+
 def _check_complete(folder: Path, runs: pd.DataFrame) -> None:
     """Every run has what its test needs, a load or coefficient, and an error to go with it."""
-    for _, run in runs.iterrows():
+    for _, run in runs[_doubtful(runs)].iterrows():
         place = f"{folder / run['file']}, row {run['row']}"
         for need in str(tests().loc[run["test"], "requires"]).split():
             quantity = "plane" if need == "delta" else need
@@ -248,21 +265,25 @@ def _originals(folder: Path, runs: pd.DataFrame) -> pd.Series:
         place = f"{folder / run['file']}, row {run['row']}, column run_id"
         text = "each run_id once a campaign; match = '(?P<run_id>...)' in [[source]] takes it from the path"
         raise InputError(place, repr(run["run_id"]), text)
-    parent = dict(zip(runs["run_id"], runs["copy_of"], strict=True))
+    copies = runs[runs["copy_of"] != ""]
+    parent = dict(zip(copies["run_id"], copies["copy_of"], strict=True))
+    known = set(runs["run_id"]) if parent else set()
 
-    def origin(run: pd.Series) -> str:
-        seen, at = {run["run_id"]}, run["copy_of"]
-        while at:
-            if at not in parent or at in seen:
-                place = f"{folder / run['file']}, row {run['row']}, column copy_of"
-                raise InputError(place, repr(run["copy_of"]), "the run_id of another run, without a circle")
+    def origin(name: str, place: str) -> str:
+        seen, at = {name}, parent[name]
+        while True:
+            if at not in known or at in seen:
+                allowed = "the run_id of another run, without a circle"
+                raise InputError(f"{place}, column copy_of", repr(parent[name]), allowed)
+            if at not in parent:
+                return at
             seen.add(at)
-            if not parent[at]:
-                return str(at)
             at = parent[at]
-        return ""
 
-    return runs.apply(origin, axis=1)
+    places = zip(copies["run_id"], copies["file"], copies["row"], strict=True)
+    found = runs["copy_of"].copy()
+    found[copies.index] = [origin(name, f"{folder / file}, row {row}") for name, file, row in places]
+    return found
 
 
 def find_campaigns(folder: Path) -> list[Path]:

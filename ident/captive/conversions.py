@@ -16,7 +16,7 @@ import pandas as pd
 
 from ident.captive.campaign_file import CampaignFile, Tare
 from ident.captive.quantities import PRIMED, TAKEN, factor
-from ident.captive.run_table import DIRECT, MOTION
+from ident.captive.run_table import DIRECT, MOTION, excluded
 from sim.boat.catalogue import ACCELERATIONS, OUTPUTS
 from sim.boat.forces import body_velocity
 from sim.files.errors import InputError
@@ -289,7 +289,9 @@ def standard_errors(runs: pd.DataFrame, header: CampaignFile, length: float) -> 
     still = {k: out[k].fillna(0.0) == 0.0 for k in MOTION}
     along = np.cos(out["alpha"].fillna(0.0)) * np.cos(out["beta"].fillna(0.0))
     still["u"] = pd.Series(along, index=out.index).abs() < _ACROSS
-    kind = pd.DataFrame(still).apply(lambda moves: "".join("01"[m] for m in moves), axis=1) + out["coefficient"]
+    # Loads of like motion: which of its components are zero, as the digits of a number.
+    kind = pd.DataFrame(still).to_numpy() @ (1 << np.arange(len(still)))
+    like = [out["test"], out["part"], pd.Series(kind, index=out.index), out["coefficient"]]
     rate2 = sum(out[c].fillna(0.0) ** 2 for c in ("p", "q", "r"))
     dynamic = out["U"].fillna(0.0) ** 2 + rate2 * length**2
     reduced = out["reduction"] != ""
@@ -299,8 +301,8 @@ def standard_errors(runs: pd.DataFrame, header: CampaignFile, length: float) -> 
             size = size.where(out[f"size_{name}"].isna(), out[f"size_{name}"])
         prime = (size / dynamic).where(dynamic > 0) if name in OUTPUTS else size
         # An excluded load is no measure of what the others can be read to.
-        prime = prime.where(~out["exclude"].map(lambda text, name=name: name in text.split()).astype(bool))
-        worst = prime.groupby([out["test"], out["part"], kind]).transform("max").fillna(0.0)
+        prime = prime.where(~excluded(out, name))
+        worst = prime.groupby(like).transform("max").fillna(0.0)
         floor = header.uncertainty.floor * worst * (dynamic if name in OUTPUTS else 1.0)
         ruled = quality * out["rel_sigma"] * np.maximum(size, floor)
         if f"s_{name}" not in out:

@@ -34,6 +34,12 @@ def sigma(measured: str) -> str:
     return f"s_{measured}"
 
 
+def excluded(runs: pd.DataFrame, measured: str) -> pd.Series:
+    """True for runs whose column ``exclude`` names a load or coefficient."""
+    texts = runs["exclude"]
+    return texts.map({text: measured in text.split() for text in texts.unique()}).astype(bool)
+
+
 def run_table(columns: Mapping[str, Any]) -> pd.DataFrame:
     """A table of your own runs with every column the checks read.
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -17,7 +18,7 @@ from ident.captive.histories import Channels, NotRising, Pieces, Reduced, reduce
 from ident.captive.quantities import Column, column, owner, suffixed
 from ident.captive.readers import openfoam
 from ident.captive.readers.opening import matching, open_sheet, reader_of
-from ident.captive.readers.table import Sheet, columns_of, run_cells
+from ident.captive.readers.table import Sheet, columns_of, run_blocks
 from ident.captive.readers.text import LARGEST, Dialect
 from ident.captive.run_table import DIRECT, REQUIRED, STATES, TEXT
 from ident.captive.source import NO_COLUMNS, Source
@@ -28,6 +29,7 @@ from sim.files.errors import InputError
 _PLAIN = Dialect()
 # By how much of itself a limit of [source.within] is widened.
 _SLACK = 1e-9
+_DIGITS = frozenset("0123456789+-.eE")
 
 
 @dataclass
@@ -181,22 +183,22 @@ def _from_table(path: Path, source: Source, header: CampaignFile, stated: Stated
     """A table with a row a run."""
     words, numbers, primed = stated
     sheet = open_sheet(path, source)
-    kinds = columns_of(sheet, source, TEXT)
-    table, rows = run_cells(sheet)
-    columns: dict[str, Any] = {}
-    for name, kind in zip(sheet.header, kinds, strict=True):
-        if kind is None:
-            text = source.columns.get(name, name)
-            if text in TEXT:
-                columns[text] = table[name].str.strip().to_numpy()
-        else:
-            columns[kind.quantity] = _numbers(sheet, table[name], rows, kind)
-            primed = primed | ({kind.quantity} if kind.primed else set())
-    for name, value in {**words, **numbers}.items():
-        if name in columns:
+    wanted: list[tuple[int, Column | None]] = []
+    names: list[str] = []
+    for at, (name, kind) in enumerate(zip(sheet.header, columns_of(sheet, source, TEXT), strict=True)):
+        text = source.columns.get(name, name)
+        if kind is not None or text in TEXT:
+            wanted.append((at, kind))
+            names.append(text if kind is None else kind.quantity)
+    for name in {**words, **numbers}:
+        if name in names:
             raise InputError(f"{sheet.where}, column {name}", "also in [source.constants]", "one of the two")
-        columns[name] = value
-    _required(sheet, columns, source)
+    _required(sheet, {*names, *words, *numbers}, source)
+    totals = {q for q in (*names, *numbers) if owner(q) in OUTPUTS and not q.startswith(("s_", "sigma_"))}
+    taken = taken_columns(sheet, source, header, totals, where) if source.subtract else []
+    cells, rows = _cells(sheet, wanted + [(t.at, t.kind) for t in taken])
+    columns: dict[str, Any] = dict(zip(names, cells, strict=False)) | {**words, **numbers}
+    primed = primed | {kind.quantity for _, kind in wanted if kind is not None and kind.primed}
     if "run_id" not in columns:
         columns["run_id"] = [f"{path.stem}-{row}" for row in rows]
     columns.setdefault("source", path.name)
@@ -204,15 +206,30 @@ def _from_table(path: Path, source: Source, header: CampaignFile, stated: Stated
         columns.setdefault(name, "")
     out = pd.DataFrame({**columns, "file": path.name, "row": rows, "reduction": ""}, index=range(len(rows)))
     out = dimensional(out, primed, source.normalisation, header, where)
-    if source.subtract:
-        totals = {q for q in columns if owner(q) in OUTPUTS and not q.startswith(("s_", "sigma_"))}
-        taken = taken_columns(sheet, source, header, totals, where)
-        cells = pd.DataFrame({i: _numbers(sheet, table.iloc[:, t.at], rows, t.kind) for i, t in enumerate(taken)})
-        out = off_table(out, taken, cells, source, header, sheet)
+    if taken:
+        off = pd.DataFrame(dict(enumerate(cells[len(wanted) :])))
+        out = off_table(out, taken, off, source, header, sheet)
     return _spread(out, source, header, str(path)) if source.reduction else out
 
 
-def _required(sheet: Sheet, columns: dict[str, Any], source: Source) -> None:
+def _cells(sheet: Sheet, wanted: list[tuple[int, Column | None]]) -> tuple[list[np.ndarray], np.ndarray]:
+    """Columns of a run table, each as numbers in SI or, without a kind, as text; and the file rows."""
+    found: list[list[np.ndarray]] = [[] for _ in wanted]
+    places = []
+    for rows, cells in run_blocks(sheet):
+        for parts, (at, kind) in zip(found, wanted, strict=True):
+            parts.append(_words(cells[at]) if kind is None else _numbers(sheet, cells[at], rows, kind))
+        places.append(np.array(rows))
+    return [np.concatenate(parts) for parts in found], np.concatenate(places)
+
+
+def _words(cells: Sequence[str]) -> np.ndarray:
+    """A column of text without blanks around; words that repeat are kept once."""
+    once: dict[str, str] = {}
+    return np.array([once.setdefault(w, w) for w in (c.strip() for c in cells)], dtype=object)
+
+
+def _required(sheet: Sheet, columns: set[str], source: Source) -> None:
     optional = {"run_id", "source"} if source.columns or source.constants else set()
     optional |= {"test"} if source.reduction else set()
     for name in REQUIRED:
@@ -221,20 +238,35 @@ def _required(sheet: Sheet, columns: dict[str, Any], source: Source) -> None:
             raise InputError(str(sheet.path), f"column {name} missing", text)
 
 
-def _numbers(sheet: Sheet, text: pd.Series, rows: list[int], kind: Column) -> np.ndarray:
+def _numbers(sheet: Sheet, cells: Sequence[str], rows: list[int], kind: Column) -> np.ndarray:
     """A column of a run table as numbers; blank is NaN."""
-    values = np.full(len(text), np.nan)
-    for i, cell in enumerate(text):
+    signless = kind.quantity.startswith("s_") or kind.quantity == "rel_sigma"
+    plain = _plain_numbers(cells) if (sheet.dialect.decimal, sheet.dialect.thousands) == (".", "") else None
+    if plain is not None and not (signless and (plain < 0.0).any()):
+        return plain * kind.factor
+    values = np.full(len(cells), np.nan)
+    for i, cell in enumerate(cells):
         if not cell.strip():
             continue
         value = sheet.dialect.number(cell)
         if value is None:
             place = f"{sheet.path}, row {rows[i]}, column {kind.name[:60]}"
             raise InputError(place, repr(cell[:60]), f"a finite number of at most {LARGEST:g}, or blank")
-        if value < 0.0 and (kind.quantity.startswith("s_") or kind.quantity == "rel_sigma"):
+        if value < 0.0 and signless:
             raise InputError(f"{sheet.path}, row {rows[i]}, column {kind.name[:60]}", cell[:60], "zero or more")
         values[i] = value * kind.factor
     return values
+
+
+def _plain_numbers(cells: Sequence[str]) -> np.ndarray | None:
+    """Cells of digits, point, sign and exponent alone as numbers; None where another stands among them."""
+    if not _DIGITS.issuperset("".join(cells)):
+        return None
+    try:
+        values = np.array([float(c) if c else math.nan for c in cells])
+    except ValueError:
+        return None
+    return values if np.nanmax(np.abs(values), initial=0.0) <= LARGEST else None
 
 
 def _spread(table: pd.DataFrame, source: Source, header: CampaignFile, where: str) -> pd.DataFrame:

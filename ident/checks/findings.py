@@ -13,7 +13,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from ident.captive.run_table import run_table
+from ident.captive.run_table import excluded, run_table
 
 if TYPE_CHECKING:
     from ident.captive.campaign import Campaign
@@ -204,7 +204,7 @@ def prime(runs: pd.DataFrame, output: str, body: Body) -> pd.Series:
 
 def kept(runs: pd.DataFrame, output: str) -> pd.Series:
     """True where a load is given and not excluded by the campaign."""
-    return runs[output].notna() & ~runs["exclude"].map(lambda text: output in text.split()).astype(bool)
+    return runs[output].notna() & ~excluded(runs, output)
 
 
 def factors(evidence: Evidence, runs: pd.DataFrame) -> pd.Series:

@@ -23,8 +23,8 @@ from ident.captive.source import Source
 from sim.files.errors import InputError
 
 Array = NDArray[np.float64]
-# A table of runs has a row a run; what is longer is a time history.
-_MOST_RUNS = 100_000
+# Rows of a table of runs that are text at once.
+_BLOCK = 1 << 14
 # Rows at the end of a history that may lack cells: what a run that is still being written leaves.
 _MOST_UNFINISHED = 10
 _NO_DATA = "; skip = '...' in [[source]] leaves out lines that are no data"
@@ -362,21 +362,32 @@ def _by_pattern(sheet: Sheet, source: Source) -> dict[str, str]:
     return found
 
 
+def run_blocks(sheet: Sheet) -> Iterator[tuple[list[int], list[tuple[str, ...]]]]:
+    """A table of runs, some thousand rows at a time: their file rows, and the cells of every column as text.
+
+    Raises
+    ------
+    InputError
+        When there is no row.
+    """
+    cells = sheet.cells()
+    block = list(itertools.islice(cells, _BLOCK))
+    if not block:
+        raise InputError(str(sheet.path), "no runs", "at least one row below the header")
+    while block:
+        yield [row for row, _ in block], list(zip(*(found for _, found in block), strict=True))
+        block = list(itertools.islice(cells, _BLOCK))
+
+
 def run_cells(sheet: Sheet) -> tuple[pd.DataFrame, list[int]]:
     """A table of runs as text, with the file row of each.
 
     Raises
     ------
     InputError
-        When there is no row, or so many that it is a time history.
+        When there is no row.
     """
-    rows, cells = [], []
-    for row, found in sheet.cells():
-        rows.append(row)
-        cells.append(found)
-        if len(rows) > _MOST_RUNS:
-            text = f"at most {_MOST_RUNS} runs; a time history is declared with rows = 'history'"
-            raise InputError(f"{sheet.path}, row {row}", "more rows", text)
-    if not rows:
-        raise InputError(str(sheet.path), "no runs", "at least one row below the header")
-    return pd.DataFrame(cells, columns=sheet.header, dtype=str), rows
+    blocks = list(run_blocks(sheet))
+    tables = [pd.DataFrame(dict(enumerate(columns)), dtype=str) for _, columns in blocks]
+    table = pd.concat(tables, ignore_index=True).set_axis(sheet.header, axis=1)
+    return table, [row for rows, _ in blocks for row in rows]
