@@ -144,14 +144,21 @@ def run(evidence: Evidence) -> list[Finding]:
     return sorted(found, key=lambda f: -SEVERITIES.index(f.severity))
 
 
-def check_campaign(campaign: Campaign, folder: Path | None = None) -> list[Finding]:
+def check_campaign(
+    campaign: Campaign, folder: Path | None = None, identified: Identification | None = None
+) -> list[Finding]:
     """Quality checks of a campaign, errors first.
 
-    Constant coefficients are identified for it and checked as a table of derivatives.
+    Parameters
+    ----------
+    campaign : From ``read_campaign``.
+    folder : Where it lies, for what stands beside the runs.
+    identified : Its coefficients, where they are at hand: constant ones are checked as a table
+        of derivatives, and identified for it otherwise.
     """
     evidence = evidence_of(campaign, folder)
     if campaign.vehicle.term_set != "reduced" and not campaign.runs.empty:
-        evidence = replace(evidence, derivatives=constants(identify(campaign)))
+        evidence = replace(evidence, derivatives=constants(identified or identify(campaign)))
     return run(evidence)
 
 

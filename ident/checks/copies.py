@@ -22,9 +22,20 @@ _NOTHING = 1e-290
 
 def digits(values: Array) -> NDArray[np.int64]:
     """Significant digits numbers are written with, up to ten; 0 for zero and NaN."""
-    texts = [f"{abs(v):.9e}" if np.isfinite(v) else "0" for v in np.ravel(values)]
-    counts = [len(t.split("e")[0].replace(".", "").strip("0")) for t in texts]
-    return np.array(counts, dtype=int).reshape(np.shape(values))
+    size = np.abs(np.nan_to_num(np.asarray(values, dtype=float), posinf=0.0, neginf=0.0))
+    size = np.where(size > _NOTHING, size, 0.0)
+    power = np.floor(np.log10(np.where(size > 0.0, size, 1.0)))
+    whole = np.rint(size * 10.0 ** (9.0 - power))
+    counts = np.where(whole > 0.0, 10, 0)
+    # A logarithm that rounds up or down leaves nine digits, or eleven.
+    counts += (whole >= 1e10).astype(int) - ((whole > 0.0) & (whole < 1e9)).astype(int)
+    left = whole.astype(np.int64)
+    for _ in range(10):
+        even = (left > 0) & (left % 10 == 0)
+        if not even.any():
+            break
+        left, counts = np.where(even, left // 10, left), counts - even
+    return counts.astype(np.int64)
 
 
 def _rounded(values: Array) -> Array:
@@ -159,10 +170,13 @@ def mirrored_copies(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
     here = list(zip(own, state_key(runs), strict=True))
     there = list(zip(seen, state_key(image), strict=True))
     first = {k: i for i, k in reversed(list(enumerate(here)))}
-    pairs = [(first[k], i) for i, k in enumerate(there) if k[0] and first.get(k, i) < i]
-    for file, group in runs.iloc[[i for _, i in pairs]].groupby("file", sort=False):
-        names = [str(runs["run_id"].iloc[a]) for a, b in pairs if runs["file"].iloc[b] == file]
-        what = f"{len(group)} runs are exact mirror images of others (the first of {names[0]})"
+    pairs = np.array([(first[k], i) for i, k in enumerate(there) if k[0] and first.get(k, i) < i], dtype=int)
+    if not pairs.size:
+        return
+    originals, copies = runs["run_id"].to_numpy()[pairs[:, 0]], runs.iloc[pairs[:, 1]]
+    for file, group in copies.groupby("file", sort=False):
+        name = originals[np.argmax(copies["file"].to_numpy() == file)]
+        what = f"{len(group)} runs are exact mirror images of others (the first of {name})"
         yield rule.finding(str(file), group["row"], OUTPUTS, what)
 
 

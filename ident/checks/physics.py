@@ -130,9 +130,10 @@ def section_levers(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
     solver = Solver(evidence.campaign)
     check_levers(solver)
     runs = evidence.runs
+    rows = {name: k for k, name in reversed(list(enumerate(runs["run_id"])))} if solver.warnings else {}
     for name, text in solver.warnings:
-        own = runs[runs["run_id"] == name]
-        yield rule.finding(str(own["file"].iloc[0]), own["row"], ["x", "y", "z"], text)
+        own = runs.iloc[rows[name]]
+        yield rule.finding(str(own["file"]), [own["row"]], ["x", "y", "z"], text)
 
 
 @check("angle_name")

@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from ident.captive.run_table import STATES
 from ident.checks.copies import mirror_image, mirror_known, state_key
 from ident.checks.findings import (
     Array,
@@ -33,6 +34,11 @@ _AXES = ("alpha", "beta", "plane", "D0", "U", "p", "q", "r")
 _LOGARITHMIC = ("D0", "U")
 _BENDING = ("alpha", "beta", "plane", "p", "q", "r")
 _ODD = [o for o, sign in MIRROR_OUTPUT.items() if sign < 0]
+# Other runs that a local fit goes through, and points on each side that are looked through for them: more than
+# that many in one place, with one load each, have no neighbour anywhere else.
+_NEAR, _BESIDE = 4, 16
+# Points worked on at once, and points of a series that are tried as the one that spoils it.
+_CHUNK, _SUSPECTS = 8192, 64
 # Normal consistency of the median absolute deviation.
 _MAD = 1.4826
 
@@ -57,7 +63,8 @@ def pairs(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
     off, share = _disagreement(evidence, runs, image, first, second)
     bad = (off > rule.limits["standard_errors"]) & (share > rule.limits["share"])
     both = pd.DataFrame({"file": runs["file"].to_numpy()[second], "known": known[first] | known[second]})
-    both["parts"] = [" and ".join(dict.fromkeys(runs["part"].iloc[[i, j]])) for i, j in couples]
+    here, there_ = (runs["part"].to_numpy(object)[k] for k in (first, second))
+    both["parts"] = np.where(here == there_, here, here + " and " + there_)
     both["many"] = bad.sum(axis=1)
     for key, group in both[both["many"] > 0].groupby(["file", "parts", "known"], sort=False):
         file, parts, trusted_less = str(key[0]), str(key[1]), bool(key[2])
@@ -126,6 +133,27 @@ def _across(runs: pd.DataFrame, output: str, evidence: Evidence) -> pd.Series:
 # -- neighbours --------------------------------------------------------------------------
 
 
+@dataclass(frozen=True)
+class Fits:
+    """A local fit through the neighbours of every point of a series.
+
+    Attributes
+    ----------
+    near : (points, 4) the neighbours.
+    weight : (points, 4) their weights in the fit.
+    noise : (points,) sqrt(1 + sum of squared weights), in errors of one load; NaN without a fit.
+    """
+
+    near: NDArray[np.int64]
+    weight: Array
+    noise: Array
+
+    def at(self, values: Array) -> Array:
+        """(points,) fitted values; those of points without a load are not looked at."""
+        fitted: Array = (self.weight * np.nan_to_num(values)[self.near]).sum(axis=1)
+        return fitted
+
+
 @dataclass
 class Series:
     """Loads along one axis, all other states the same; mirror images of runs included.
@@ -139,25 +167,45 @@ class Series:
     loads: Array
     owner: NDArray[np.int64]
 
-    def local_fits(self, given: NDArray[np.bool_]) -> tuple[Array, Array]:
-        """Weights (points, points) of the fit at each point, and the noise of a deviation.
+    def local_fits(self, given: NDArray[np.bool_]) -> Fits:
+        """Fit at each point: quadratic through the four nearest other runs, straight through fewer.
 
-        Quadratic through the four nearest other runs, straight through fewer; the noise is
-        sqrt(1 + sum of squared weights), NaN where fewer than two others are given.
+        There is none where fewer than two different positions are near.
         """
-        n = self.at.size
-        weight, noise = np.zeros((n, n)), np.full(n, np.nan)
-        for k in np.flatnonzero(given):
-            others = np.flatnonzero(given & (self.owner != self.owner[k]))
-            near = others[np.argsort(np.abs(self.at[others] - self.at[k]), kind="stable")[:4]]
-            distinct = np.unique(self.at[near].round(9)).size
-            if distinct < 2:
-                continue
-            offset = self.at[near] - self.at[k]
-            basis = np.vander(offset / np.abs(offset).max(), 3 if distinct >= 4 else 2, increasing=True)
-            weight[k, near] = np.linalg.pinv(basis)[0]
-            noise[k] = math.sqrt(1.0 + float(weight[k] @ weight[k]))
-        return weight, noise
+        near, count = self._nearest(given)
+        at = np.where(np.arange(_NEAR) < count[:, None], self.at[near], np.nan)
+        different = np.sort(at.round(9), axis=1)
+        distinct = (count > 0) + (np.diff(different, axis=1) > 0.0).sum(axis=1)
+        weight, noise = np.zeros(near.shape), np.full(len(near), np.nan)
+        offset = at - self.at[:, None]
+        for size in range(2, _NEAR + 1):
+            for terms in (2, 3):
+                own = np.flatnonzero((count == size) & (distinct >= 2) & ((distinct >= 4) == (terms == 3)))
+                if own.size:
+                    x = offset[own, :size] / np.abs(offset[own, :size]).max(axis=1, keepdims=True)
+                    weight[own, :size] = np.linalg.pinv(x[:, :, None] ** np.arange(terms))[:, 0, :]
+                    noise[own] = np.sqrt(1.0 + (weight[own] ** 2).sum(axis=1))
+        return Fits(near, weight, noise)
+
+    def _nearest(self, given: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """(points, 4) nearest given points of other runs, first those that stand first; and how many there are."""
+        order = np.flatnonzero(given)[np.argsort(self.at[given], kind="stable")]
+        near = np.zeros((self.at.size, _NEAR), dtype=np.int64)
+        count = np.zeros(self.at.size, dtype=np.int64)
+        beside = np.concatenate([np.arange(-_BESIDE, 0), np.arange(1, _BESIDE + 1)])
+        for low in range(0, order.size, _CHUNK):
+            place = np.arange(low, min(low + _CHUNK, order.size))
+            point, window = order[place], place[:, None] + beside
+            inside = (window >= 0) & (window < order.size)
+            others = np.sort(np.where(inside, order[window.clip(0, order.size - 1)], self.at.size), axis=1)
+            known = others < self.at.size
+            others = np.where(known, others, 0)
+            known &= self.owner[others] != self.owner[point][:, None]
+            distance = np.where(known, np.abs(self.at[others] - self.at[point][:, None]), np.inf)
+            first = np.argsort(distance, axis=1, kind="stable")[:, :_NEAR]
+            near[point, : first.shape[1]] = np.take_along_axis(others, first, axis=1)
+            count[point] = np.minimum(known.sum(axis=1), _NEAR)
+        return near, count
 
 
 def _series(evidence: Evidence) -> list[Series]:
@@ -165,8 +213,8 @@ def _series(evidence: Evidence) -> list[Series]:
     assert evidence.body is not None
     runs = evidence.runs[evidence.runs["copy_of"] == ""]
     runs = runs[runs["decoupled"] != "True"] if "decoupled" in runs else runs
-    for output in OUTPUTS:
-        runs = runs.assign(**{output: runs[output].where(kept(runs, output))})
+    runs = runs[["test", "part", "exclude", *STATES, *OUTPUTS]]
+    runs = runs.assign(**{output: runs[output].where(kept(runs, output)) for output in OUTPUTS})
     known = mirror_known(runs, evidence.vehicle)
     image = mirror_image(runs[known], evidence.vehicle)
     table = pd.concat([runs, image], ignore_index=True)
@@ -175,6 +223,7 @@ def _series(evidence: Evidence) -> list[Series]:
     loads = table[list(OUTPUTS)].to_numpy(float) / scale[:, None]
     loads[:, 3:] /= evidence.body.length
     first = ~pd.DataFrame({"owner": owner, "state": state_key(table)}).duplicated().to_numpy()
+    tests = pd.util.hash_array(table["test"].to_numpy(object))
     found = []
     for axis in _AXES:
         at = table[axis].to_numpy(float)
@@ -182,11 +231,12 @@ def _series(evidence: Evidence) -> list[Series]:
         at = np.log(np.where(usable, at, 1.0)) if axis in _LOGARITHMIC else np.nan_to_num(at)
         # Without speed, load over rate squared jumps with the sign of the rate.
         side = np.where(np.nan_to_num(table["U"]) == 0.0, np.sign(at), 0.0) if axis in "pqr" else np.zeros(at.size)
-        rest = state_key(table.assign(**{axis: 0.0})).to_numpy() ^ pd.util.hash_array(table["test"].to_numpy(object))
+        rest = state_key(table.assign(**{axis: 0.0})).to_numpy() ^ tests
         rest ^= (side + 1.0).astype(np.uint64)
-        for key, count in zip(*np.unique(rest[usable], return_counts=True), strict=True):
-            group = np.flatnonzero(usable & (rest == key)) if count >= 3 else np.zeros(0, dtype=int)
-            if np.unique(owner[group]).size >= 3 and np.unique(at[group].round(9)).size >= 3:
+        places = np.flatnonzero(usable)
+        order = places[np.argsort(rest[places], kind="stable")]
+        for group in np.split(order, np.flatnonzero(np.diff(rest[order])) + 1):
+            if group.size >= 3 and np.unique(owner[group]).size >= 3 and np.unique(at[group].round(9)).size >= 3:
                 found.append(Series(axis, at[group], loads[group], owner[group]))
     return found
 
@@ -207,20 +257,22 @@ def deviations(evidence: Evidence, every: list[Series]) -> pd.DataFrame:
     series share here) and scale (one robust standard deviation, at least the run's own
     standard error before its quality factor).
     """
-    rows = []
+    pieces: list[pd.DataFrame] = []
     for number, series in enumerate(every):
         stencil = hash(tuple(np.sort(series.at).round(6)))
         given, fits = np.isfinite(series.loads), {}
         for output, values, known in zip(OUTPUTS, series.loads.T, given.T, strict=True):
             if known.tobytes() not in fits:
                 fits[known.tobytes()] = series.local_fits(known)
-            weight, noise = fits[known.tobytes()]
-            fit = weight @ np.where(known, values, 0.0)
-            for k in np.flatnonzero(np.isfinite(noise)):
-                place = (number, k, series.owner[k], output, series.axis, series.at[k].round(6), stencil)
-                rows.append((*place, values[k], fit[k], noise[k]))
+            local = fits[known.tobytes()]
+            point = np.flatnonzero(np.isfinite(local.noise))
+            own = {"point": point, "owner": series.owner[point], "at": series.at[point].round(6)}
+            own |= {"load": values[point], "fit": local.at(values)[point], "noise": local.noise[point]}
+            whole = {"series": number, "output": output, "axis": series.axis, "stencil": stencil}
+            if point.size:
+                pieces.append(pd.DataFrame({**own, **whole}))
     names = ["series", "point", "owner", "output", "axis", "at", "stencil", "load", "fit", "noise"]
-    table = pd.DataFrame(rows, columns=names)
+    table = pd.concat(pieces, ignore_index=True)[names] if pieces else pd.DataFrame(columns=names)
     runs = evidence.runs.loc[table["owner"]]
     kind = [table["output"], table["axis"], pd.Series(runs["test"].to_numpy()), pd.Series(runs["part"].to_numpy())]
     raw = (table["load"] - table["fit"]) / table["noise"]
@@ -253,14 +305,16 @@ def _culprit(group: pd.DataFrame, series: Series) -> int:
     """
     values = np.full(series.at.size, np.nan)
     values[group["point"]] = group["load"] - group["usual"]
+    # In a long series the bad point is among the worst.
+    worst = group.loc[group["off"].abs().sort_values(ascending=False, kind="stable").index[:_SUSPECTS].sort_values()]
     left = {}
-    for row, owner in zip(group.index.to_numpy(), group["owner"], strict=True):
+    for row, owner in zip(worst.index.to_numpy(), worst["owner"], strict=True):
         given = np.isfinite(values) & (series.owner != owner)
-        weight, noise = series.local_fits(given)
-        judged = np.isfinite(noise)
+        local = series.local_fits(given)
+        judged = np.isfinite(local.noise)
         if judged.sum() < 3:
             return int(group.index.to_numpy()[np.argmax(group["off"].abs().to_numpy())])
-        off = (values - weight @ np.where(given, values, 0.0))[judged] / noise[judged]
+        off = (values - local.at(values))[judged] / local.noise[judged]
         left[int(row)] = float(np.abs(off).sum() / judged.sum())
     return int(min(left, key=lambda row: left[row]))
 

@@ -9,11 +9,13 @@ from collections.abc import Iterator
 from functools import cache
 from importlib.resources import files
 
+import numpy as np
 import pandas as pd
 
 from ident.captive.published import TEST as PUBLISHED
 from ident.captive.run_table import PROPULSION
 from ident.checks.findings import Evidence, Finding, Rule, check, rules
+from ident.identification.equations import Runs
 from ident.identification.nodes import vanishes
 from ident.identification.solver import Solver
 from sim.boat.catalogue import OUTPUTS
@@ -199,20 +201,24 @@ def unsupported_terms(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
         return
     solver = Solver(campaign)
     seen, own = set(), set()
-    for _, run in campaign.runs.iterrows():
+    runs = Runs.of(campaign.runs)
+    # Whether a state has a run of its own, beside copies of others that are no mirror images.
+    first_hand = (runs.words("copy_of") == "") | (runs.words("quality") == "mirrored")
+    measured = np.bincount(runs.state, weights=first_hand, minlength=len(runs.first)) > 0
+    for state, run in runs.records(np.arange(len(runs.first))):
         features = solver.features(run)
         if run["test"] == PUBLISHED:
             term = solver.by_name[run["coefficient"]]
             own.add(solver.canonical(term.name, run["part"], solver.place(term, features))[0][:2])
             continue
-        given = [o for o in (*OUTPUTS, *PROPULSION) if pd.notna(run[o]) and o not in run["exclude"].split()]
+        given = [o for o in (*OUTPUTS, *PROPULSION) if not math.isnan(run[o]) and o not in run["exclude"].split()]
         names = {(o, "propeller") for o in given if o in PROPULSION}
         for output in given:
             for term, _ in solver.active(run, output, features) if output in OUTPUTS else ():
                 key, sign = solver.canonical(term.name, run["part"], solver.place(term, features))
                 names |= {key[:2]} if run["test"] in term.tests and sign else set()
         seen |= names
-        own |= names if not run["copy_of"] or run["quality"] == "mirrored" else set()
+        own |= names if measured[state] else set()
     absent: dict[str, list[str]] = {}
     copied: dict[str, list[str]] = {}
     for term in vehicle_terms(campaign.vehicle):

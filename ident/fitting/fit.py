@@ -111,12 +111,12 @@ def fit(folder: Path, db: str, message: str = "", strict: bool = False, wait: fl
         if names.count(name) > 1:
             text = "one campaign a vehicle: a version replaces all rows of its vehicle"
             raise InputError(str(path / "campaign.toml"), f"vehicle {name!r} has {names.count(name)} campaigns", text)
-    checked = [check_campaign(campaign, path) for path, campaign in zip(paths, read, strict=True)]
+    identified = [identify(campaign) for campaign in read]
+    checked = [check_campaign(*one) for one in zip(read, paths, identified, strict=True)]
     if strict:
         for path, findings in zip(paths, checked, strict=True):
             refuse_errors(path, findings)
-    identified = [(campaign, identify(campaign)) for campaign in read]
-    ready = [(campaign, found, database_rows(found)) for campaign, found in identified]
+    ready = [(campaign, found, database_rows(found)) for campaign, found in zip(read, identified, strict=True)]
     done = []
     for (campaign, found, rows), findings in zip(ready, checked, strict=True):
         version, new = commit(db, rows, metadata(campaign, found, message, findings), wait)

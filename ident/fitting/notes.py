@@ -68,8 +68,9 @@ def group_warnings(warnings: Iterable[Any]) -> list[WarningGroup]:
         if numbers:
             group.lowest = min(numbers[0], group.lowest if group.lowest is not None else numbers[0])
             group.highest = max(numbers[0], group.highest if group.highest is not None else numbers[0])
-        if str(subject) not in group.subjects:
-            group.subjects.append(str(subject))
+        group.subjects.append(str(subject))
+    for group in groups.values():
+        group.subjects = list(dict.fromkeys(group.subjects))
     return list(groups.values())
 
 
