@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from typing import Any
 
@@ -189,10 +190,13 @@ def frozen_column(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
     states, whole = state_key(runs), load_key(runs, rule)
     found: dict[tuple[str, str, bool], list[pd.DataFrame]] = {}
     for output in OUTPUTS:
-        sharp = digits(runs[output].to_numpy(float)) >= rule.limits["digits"]
-        usable = runs[kept(runs, output) & sharp]
+        count = pd.Series(digits(runs[output].to_numpy(float)), index=runs.index)
+        usable = runs[kept(runs, output) & (count >= rule.limits["digits"])]
         key = _hashed(pd.DataFrame({"test": usable["test"], "value": _rounded(usable[output].to_numpy(float))}))
-        for _, group in _again(usable, key):
+        tests = count[usable.index].groupby(usable["test"]).agg(["size", "max"])
+        least = {t: _beyond_chance(int(n), int(d), rule.limits["chance"]) for t, n, d in tests.itertuples()}
+        many = key.groupby(key).transform("size") >= usable["test"].map(least)
+        for _, group in _again(usable[many], key[many]):
             others = group[[o for o in OUTPUTS if o != output]].notna().any(axis=None)
             same = others and whole[group.index].nunique() == 1
             if states[group.index].nunique() < 2 or same:
@@ -207,6 +211,23 @@ def frozen_column(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
         yield rule.finding(
             file, table["row"], columns, what + f"stand in {table['row'].nunique()} runs", milder(rule, known)
         )
+
+
+def _beyond_chance(count: int, shown: int, chance: float) -> int:
+    """Fewest of some values that agree and are not expected to by chance.
+
+    Of n values that are equally likely to be any of m, n^k / (k! m^(k-1)) groups of k agree.
+
+    Parameters
+    ----------
+    count : Number of values, n.
+    shown : Digits they are written with; the first of them tells little, m = 10^(digits - 1).
+    chance : Groups expected by chance that are still taken for none.
+    """
+    size, m = 2, 10.0 ** (min(shown, _AGREE) - 1)
+    while size < count and size * math.log(count) - math.lgamma(size + 1) - (size - 1) * math.log(m) > math.log(chance):
+        size += 1
+    return size
 
 
 def _axes(group: pd.DataFrame) -> str:

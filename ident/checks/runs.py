@@ -257,7 +257,8 @@ def deviations(evidence: Evidence, every: list[Series]) -> pd.DataFrame:
     series share here) and scale (one robust standard deviation, at least the run's own
     standard error before its quality factor).
     """
-    pieces: list[pd.DataFrame] = []
+    pieces: dict[str, list[Array]] = {name: [] for name in ("point", "owner", "at", "load", "fit", "noise")}
+    places: list[tuple[int, str, str, int]] = []
     for number, series in enumerate(every):
         stencil = hash(tuple(np.sort(series.at).round(6)))
         given, fits = np.isfinite(series.loads), {}
@@ -266,13 +267,15 @@ def deviations(evidence: Evidence, every: list[Series]) -> pd.DataFrame:
                 fits[known.tobytes()] = series.local_fits(known)
             local = fits[known.tobytes()]
             point = np.flatnonzero(np.isfinite(local.noise))
-            own = {"point": point, "owner": series.owner[point], "at": series.at[point].round(6)}
-            own |= {"load": values[point], "fit": local.at(values)[point], "noise": local.noise[point]}
-            whole = {"series": number, "output": output, "axis": series.axis, "stencil": stencil}
-            if point.size:
-                pieces.append(pd.DataFrame({**own, **whole}))
-    names = ["series", "point", "owner", "output", "axis", "at", "stencil", "load", "fit", "noise"]
-    table = pd.concat(pieces, ignore_index=True)[names] if pieces else pd.DataFrame(columns=names)
+            own = (point, series.owner[point], series.at[point].round(6), values[point], local.at(values)[point])
+            for column, piece in zip(pieces.values(), (*own, local.noise[point]), strict=True):
+                column.append(piece)
+            places.append((number, output, series.axis, stencil))
+    size = [len(piece) for piece in pieces["point"]]
+    table = pd.DataFrame({name: np.concatenate([np.zeros(0), *own]) for name, own in pieces.items()})
+    table = table.astype({"point": int, "owner": evidence.runs.index.dtype})
+    for k, (name, kind_of) in enumerate({"series": int, "output": object, "axis": object, "stencil": int}.items()):
+        table[name] = np.repeat(np.array([place[k] for place in places], dtype=kind_of), size)
     runs = evidence.runs.loc[table["owner"]]
     kind = [table["output"], table["axis"], pd.Series(runs["test"].to_numpy()), pd.Series(runs["part"].to_numpy())]
     raw = (table["load"] - table["fit"]) / table["noise"]

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
 from ident.captive.campaign import Campaign
@@ -22,6 +24,8 @@ from sim.boat.tables import Table
 
 Array = NDArray[np.float64]
 Key = tuple[str, str]
+# A row of the run table.
+Run = Mapping[str, Any] | pd.Series
 
 # Relative to the length: levers closer than this are the same lever, rounded.
 _LEVER_DIGITS = 1e-5
@@ -107,7 +111,7 @@ class Solver:
 
     # -- equations -----------------------------------------------------------------------
 
-    def features(self, run: Mapping[str, Any]) -> dict[str, float]:
+    def features(self, run: Run) -> dict[str, float]:
         """Feature values of a run's state."""
         given = {k: float(run[k]) for k in ("U", "alpha", "beta", "p", "q", "r", "plane", *ACCELERATIONS)}
         zero = {k: 0.0 if math.isnan(x) else x for k, x in given.items()}
@@ -118,7 +122,7 @@ class Solver:
             found |= plane_features(self.planes[run["part"]], velocity, rates, zero["plane"])
         return found | {name: zero[name] for name in ACCELERATIONS}
 
-    def active(self, run: Mapping[str, Any], output: str, features: dict[str, float]) -> list[tuple[Term, float]]:
+    def active(self, run: Run, output: str, features: dict[str, float]) -> list[tuple[Term, float]]:
         """Terms of the run's part that load this output in this state."""
         found = []
         for term in self.loading.get((output, run["part"]), []):
@@ -127,11 +131,11 @@ class Solver:
                 found.append((term, m))
         return found
 
-    def skip(self, run: Mapping[str, Any], output: str, reason: str) -> None:
+    def skip(self, run: Run, output: str, reason: str) -> None:
         """Note that a load of a run is not used, and why."""
         self.unused.append((run["run_id"], run["file"], int(run["row"]), output, reason))
 
-    def load_form(self, run: Mapping[str, Any], output: str, features: dict[str, float]) -> tuple[Form, list[Note]]:
+    def load_form(self, run: Run, output: str, features: dict[str, float]) -> tuple[Form, list[Note]]:
         """One load of a state: terms its test identifies are unknown, the others known."""
         form, notes = Form(output, {}, {}), []
         zero_by_symmetry = False
@@ -164,7 +168,7 @@ class Solver:
             notes.append(Note(output, text, unused=True, when=NONZERO))
         return form, notes
 
-    def direct_form(self, run: Mapping[str, Any], output: str, features: dict[str, float]) -> tuple[Form, list[Note]]:
+    def direct_form(self, run: Run, output: str, features: dict[str, float]) -> tuple[Form, list[Note]]:
         """A coefficient given as it is: of a propeller test, or published."""
         published = run["test"] == PUBLISHED
         term = self.by_name[run["coefficient"] if published else output]
@@ -181,7 +185,7 @@ class Solver:
         self.nodes[node].seen.add((part, key[2]))
         return Form(output, {node: float(sign)}, {}), []
 
-    def forms(self, run: Mapping[str, Any]) -> tuple[list[Form], list[Note]]:
+    def forms(self, run: Run) -> tuple[list[Form], list[Note]]:
         """Every usable load and directly measured coefficient of a state, and what is to be said of the others.
 
         Parameters
@@ -226,8 +230,8 @@ class Solver:
         self._note(runs, rows, notes)
         grid = number[runs.state[rows]]
         place, output = np.nonzero(grid >= 0)
-        run = rows[place]
-        return Equations(forms, grid[place, output], run, output, runs.value[run, output], runs.sigma[run, output])
+        own = rows[place]
+        return Equations(forms, grid[place, output], own, output, runs.value[own, output], runs.sigma[own, output])
 
     def _note(self, runs: Runs, rows: NDArray[np.int64], notes: dict[int, list[Note]]) -> None:
         """Say of every run what its state gives occasion to."""
@@ -271,7 +275,7 @@ class Solver:
         equation = np.repeat(np.arange(len(equations.form)), np.diff(a.indptr))[order]
         ends = np.searchsorted(a.indices[order], np.arange(a.shape[1] + 1))
         names, qualities, kinds = (runs.words(c)[equations.run] for c in ("run_id", "quality", "test"))
-        for k, (low, high) in enumerate(zip(ends, ends[1:], strict=False)):
+        for k, (low, high) in enumerate(itertools.pairwise(ends)):
             own, node = equation[low:high], self.nodes[first + k]
             node.runs += names[own].tolist()
             node.qualities += dict.fromkeys(qualities[own].tolist())
