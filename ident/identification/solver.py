@@ -230,8 +230,10 @@ class Solver:
         self._note(runs, rows, notes)
         grid = number[runs.state[rows]]
         place, output = np.nonzero(grid >= 0)
-        own = rows[place]
-        return Equations(forms, grid[place, output], own, output, runs.value[own, output], runs.sigma[own, output])
+        which = rows[place]
+        return Equations(
+            forms, grid[place, output], which, output, runs.value[which, output], runs.sigma[which, output]
+        )
 
     def _note(self, runs: Runs, rows: NDArray[np.int64], notes: dict[int, list[Note]]) -> None:
         """Say of every run what its state gives occasion to."""
