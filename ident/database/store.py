@@ -114,7 +114,8 @@ def _check_finite(rows: pd.DataFrame, where: str) -> None:
         raise InputError(where, text, "loads and errors of a size the arithmetic holds")
 
 
-def _arrow(rows: pd.DataFrame) -> Any:
+def arrow(rows: pd.DataFrame) -> Any:
+    """Rows as an Arrow table with the types of the database."""
     import pyarrow as pa
 
     kinds = {"double": pa.float64(), "int64": pa.int64(), "string": pa.string()}
@@ -170,37 +171,68 @@ def _commit(path: str, rows: pd.DataFrame, metadata: dict[str, str], wait: float
             if beside.pop(vehicle, "") == content:
                 return log.last, False
             log = _kept_for_ever(log)
-        own = {
-            "digest": content,
-            "program": f"ident {__version__}",
-            "parent": metadata.get("parent", str(log.last) if log else ""),
-            "vehicle": vehicle,
-            "time": str(time.time_ns() // 1_000_000),
-            "beside": json.dumps(beside, sort_keys=True),
-            "after": str(log.last if log else -1),
-        }
-        said = {**metadata, **own}
-        said["seal"] = seal(said)
-        if _written(path, rows, said, vehicle if log else None, last_try=time.monotonic() > until):
+        parent = metadata.get("parent", str(log.last) if log else "")
+        said = _said({**metadata, "parent": parent}, vehicle, content, beside, log.last if log else -1)
+        how: dict[str, Any] = {"mode": "error", "configuration": FOR_EVER}
+        if log:
+            predicate = "vehicle = '" + vehicle.replace("'", "''") + "'"
+            how = {"mode": "overwrite", "schema_mode": "merge", "predicate": predicate}
+        if _written(path, rows, said, how, last_try=time.monotonic() > until):
             return _finished(path, said["seal"]), True
         # Another fit committed in between, as it can on an object store: look again, not all at once.
         time.sleep(random.uniform(0.05, 0.5))
 
 
-def _written(path: str, rows: pd.DataFrame, said: dict[str, str], replaced: str | None, last_try: bool) -> bool:
-    """Write a version; False when another was faster. ``replaced`` is None for a new database."""
-    from deltalake import CommitProperties, PostCommitHookProperties, write_deltalake
-    from deltalake.exceptions import CommitFailedError
+def _said(metadata: dict[str, str], vehicle: str, content: str, beside: dict[str, str], after: int) -> dict[str, str]:
+    """What a commit says of itself, sealed."""
+    said = metadata | {
+        "digest": content,
+        "program": f"ident {__version__}",
+        "vehicle": vehicle,
+        "time": str(time.time_ns() // 1_000_000),
+        "beside": json.dumps(beside, sort_keys=True),
+        "after": str(after),
+    }
+    return said | {"seal": seal(said)}
 
-    how: dict[str, Any] = {"mode": "error", "configuration": FOR_EVER}
-    if replaced is not None:
-        predicate = "vehicle = '" + replaced.replace("'", "''") + "'"
-        how = {"mode": "overwrite", "schema_mode": "merge", "predicate": predicate}
+
+def commit_again(path: str, everything: pd.DataFrame, vehicle: str, metadata: dict[str, str], after: int) -> int:
+    """Commit the rows of every vehicle in place of a version that is damaged; hold the lock of the folder.
+
+    Parameters
+    ----------
+    path : Folder or object-store URL of the database.
+    everything : Rows of all vehicles.
+    vehicle : Whose rows the damaged version held wrongly.
+    metadata : Of the commit that wrote them first.
+    after : Number of the version that is replaced.
+
+    Returns
+    -------
+    Number of the new version.
+
+    Raises
+    ------
+    InputError
+        As ``commit``.
+    """
+    digests = {str(name): digest(rows) for name, rows in everything.groupby("vehicle")}
+    content = digests.pop(vehicle)
+    said = _said({k: v for k, v in metadata.items() if k != "seal"}, vehicle, content, digests, after)
+    _written(path, everything, said, {"mode": "overwrite"}, last_try=True)
+    return _finished(path, said["seal"])
+
+
+def _written(path: str, rows: pd.DataFrame, said: dict[str, str], how: dict[str, Any], last_try: bool) -> bool:
+    """Write a version; False when another was faster."""
+    from deltalake import CommitProperties, PostCommitHookProperties, write_deltalake
+    from deltalake.exceptions import CommitFailedError, DeltaError
+
     with engine(path, "the version cannot be written", "room, and a path you may write to"):
         try:
             write_deltalake(
                 path,
-                _arrow(rows),
+                arrow(rows),
                 commit_properties=CommitProperties(custom_metadata=said),
                 post_commithook_properties=PostCommitHookProperties(cleanup_expired_logs=False),
                 **how,
@@ -210,6 +242,11 @@ def _written(path: str, rows: pd.DataFrame, said: dict[str, str], replaced: str 
                 raise InputError(
                     path, f"another fit wrote at the same time: {brief(error)}", "run the fit again"
                 ) from error
+            return False
+        except DeltaError:
+            # Another fit made the database in between.
+            if last_try or how["mode"] != "error" or not has_versions(path):
+                raise
             return False
     return True
 

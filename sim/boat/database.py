@@ -214,8 +214,7 @@ def check_digests(log: Log, number: int, everything: pd.DataFrame, vehicle: str 
         if not wanted:
             text = f"rows of {name!r} that no commit of `ident fit` vouches for"
             raise InputError(where, text if complete else f"{text}: the log begins at version {log.first}", WHOLE)
-        rows = everything[everything["vehicle"] == name]
-        if not any(digest(rows, columns) == wanted for columns in _columns_of_the_time(log, number)):
+        if not matches(log, number, everything[everything["vehicle"] == name], wanted):
             text = f"rows of {name!r} are not those that were committed (digest {wanted[:16]})"
             raise InputError(where, text, WHOLE)
         found[name] = wanted
@@ -231,6 +230,11 @@ def stored_rows(log: Log, number: int) -> pd.DataFrame:
     if rows["vehicle"].isna().any():
         raise InputError(f"{log.path}, version {number}", "rows without a vehicle", WHOLE)
     return rows
+
+
+def matches(log: Log, number: int, rows: pd.DataFrame, wanted: str) -> bool:
+    """Whether rows of one vehicle in a version have a digest."""
+    return any(digest(rows, columns) == wanted for columns in _columns_of_the_time(log, number))
 
 
 def _columns_of_the_time(log: Log, number: int) -> Iterator[list[str]]:

@@ -159,6 +159,7 @@ class Log:
     ----------
     path : Folder or object-store URL of the database.
     but : An entry to leave out, ``_delta_log/`` and its name.
+    holes : Also open a log with missing or empty entries; reading one of them is refused still.
 
     Raises
     ------
@@ -166,7 +167,7 @@ class Log:
         When there is no database, or an entry is missing.
     """
 
-    def __init__(self, path: str, but: str = "") -> None:
+    def __init__(self, path: str, but: str = "", holes: bool = False) -> None:
         self.path = path
         self.storage = Storage(path)
         local = self.storage.local
@@ -185,7 +186,7 @@ class Log:
         self.first = numbers[0] if numbers and any(".checkpoint." in name for name in every) else 0
         self.last = max([*numbers, -1 if latest is None else latest])
         self._entries: dict[int, Entry] = {}
-        for number in range(self.first, self.last + 1):
+        for number in range(self.first, self.last + 1) if not holes else ():
             size = files.get(f"{number:020d}.json")
             if size is None:
                 text = f"the entry of version {number} is missing from the log"

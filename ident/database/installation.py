@@ -1,0 +1,102 @@
+"""What the program runs on: versions, threads, caches, and a test of itself that takes a moment."""
+
+from __future__ import annotations
+
+import os
+import platform
+import sys
+import tempfile
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+from ident import __version__
+
+# Packages whose version decides what is computed, written or drawn.
+_PACKAGES = (
+    "numpy",
+    "scipy",
+    "pandas",
+    "numba",
+    "pyarrow",
+    "deltalake",
+    "matplotlib",
+    "pydantic",
+    "pint",
+    "click",
+    "rich",
+    "filelock",
+    "capytaine",
+    "distributed",
+)
+_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
+
+
+def installation() -> dict[str, Any]:
+    """Versions, threads and caches.
+
+    Returns
+    -------
+    ``program``, ``python``, ``machine``, ``packages`` (name -> version, empty when absent),
+    ``threads`` (cores, and what limits them), ``cache`` (folder of compiled functions and its
+    size in bytes).
+    """
+    found = {}
+    for name in _PACKAGES:
+        try:
+            found[name] = metadata.version(name)
+        except metadata.PackageNotFoundError:
+            found[name] = ""
+    import sim  # noqa: F401  chooses the folder
+
+    cache = os.environ.get("NUMBA_CACHE_DIR", "")
+    size = sum(p.stat().st_size for p in Path(cache).rglob("*") if p.is_file()) if cache else 0
+    return {
+        "program": f"ident {__version__}",
+        "python": sys.version.split()[0],
+        "machine": f"{platform.system()} {platform.machine()}",
+        "packages": found,
+        "threads": {"cores": os.cpu_count() or 1} | {k: os.environ[k] for k in _THREADS if k in os.environ},
+        "cache": {"folder": cache, "bytes": size},
+    }
+
+
+def self_test() -> list[dict[str, str]]:
+    """Bundled boats loaded, and rows committed to a database in a temporary folder and read back.
+
+    Returns
+    -------
+    One entry a test: ``test`` and ``fault``, empty when it passed.
+    """
+    found = []
+    for name, test in (("bundled vehicles", _vehicles), ("a database, written and read back", _database)):
+        try:
+            test()
+            found.append({"test": name, "fault": ""})
+        except Exception as error:
+            # Whatever goes wrong is what this is for.
+            found.append({"test": name, "fault": f"{type(error).__name__}: {error}"})
+    return found
+
+
+def _vehicles() -> None:
+    import sim.boat.vehicle as module
+
+    for path in sorted((Path(module.__file__).parents[1] / "vehicles").glob("*.toml")):
+        module.load_vehicle(path.stem)
+
+
+def _database() -> None:
+    import pandas as pd
+
+    from ident.database.store import commit
+    from sim.boat.database import column_order, column_type, digest, read_rows
+
+    cells = {"double": 0.1, "int64": 1, "string": "x"}
+    rows = pd.DataFrame([{c: cells[column_type(c)] for c in column_order()}])
+    with tempfile.TemporaryDirectory() as folder:
+        for factor in (1.0, 2.0):
+            commit(folder, rows.assign(value=factor), {"message": "self-test"})
+        for number, factor in enumerate((1.0, 2.0)):
+            if digest(read_rows(folder, number)[0]) != digest(rows.assign(value=factor)):
+                raise ValueError(f"version {number} is not what was committed")
