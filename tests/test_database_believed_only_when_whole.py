@@ -14,6 +14,7 @@ from pathlib import Path
 import pandas as pd
 import pytest
 from click.testing import CliRunner
+from database_writers import Writers
 from deltalake import CommitProperties, DeltaTable, write_deltalake
 from small_campaign import fitted, write
 
@@ -332,38 +333,14 @@ def test_rows_written_before_an_axis_existed_keep_their_digest(tmp_path, few):
 
 # -- one history, while others write -------------------------------------------------------
 
-WRITER = """
-import sys
-from ident.database.store import commit
-from sim.boat.database import read_rows
-path, mine, rounds = sys.argv[1], int(sys.argv[2]), int(sys.argv[3])
-rows, _ = read_rows(path, 0)
-print("ready", flush=True)
-sys.stdin.readline()
-for k in range(rounds):
-    print(*commit(path, rows.assign(value=rows["value"] * (1.0 + 1e-4 * (1000 * mine + k + 1))), {"by": f"{mine}.{k}"}))
-"""
-
-
-def writers(path: str, how_many: int, rounds: int) -> list[subprocess.Popen[str]]:
-    program = [sys.executable, "-c", WRITER, path]
-    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
-    started = [subprocess.Popen([*program, str(k), str(rounds)], text=True, **pipes) for k in range(how_many)]
-    for process in started:
-        assert process.stdout.readline() == "ready\n", process.stderr.read()
-    for process in started:
-        process.stdin.write("go\n")
-        process.stdin.flush()
-    return started
-
 
 def test_eight_writers_and_a_reader_end_in_one_line_of_versions(tmp_path, few):
-    path, rounds = str(tmp_path / "db"), 2
+    path, rounds = str(tmp_path / "db"), 3
     commit(path, few, {})
-    at_work = writers(path, 8, rounds)
+    at_work = Writers(path, [few] * 8, rounds)
     seen: dict[int, str] = {}
     readings = 0
-    while any(process.poll() is None for process in at_work):
+    while at_work.at_work:
         history = versions(path)
         assert [v.number for v in history] == list(range(len(history)))
         for v in history:
@@ -371,15 +348,12 @@ def test_eight_writers_and_a_reader_end_in_one_line_of_versions(tmp_path, few):
         rows, number = read_rows(path)
         assert seen.get(number, digest(rows)) == digest(rows)
         readings += 1
-        time.sleep(0.05)
-    said = [process.communicate() for process in at_work]
-    assert all(process.returncode == 0 for process in at_work), said
-    numbers = sorted(int(line.split()[0]) for out, _ in said for line in out.splitlines())
-    assert numbers == list(range(1, 8 * rounds + 1))
+        time.sleep(0.02)
+    assert sorted(at_work.done()) == [(n, True) for n in range(1, 8 * rounds + 1)]
     assert readings > 3
     for v in versions(path):
         assert digest(read_rows(path, v.number)[0]) == v.digest == seen.get(v.number, v.digest)
-    assert {v.metadata["by"] for v in versions(path)[1:]} == {f"{m}.{k}" for m in range(8) for k in range(rounds)}
+    assert {v.metadata["by"] for v in versions(path)[1:]} == at_work.by
 
 
 def test_a_commit_between_two_looks_at_the_log_shifts_nothing(db, few, monkeypatch):

@@ -42,7 +42,16 @@ def engine(where: str, doing: str, allowed: str) -> Iterator[None]:
         yield
     except InputError:
         raise
-    except (DeltaError, ArrowException, OSError, ValueError, KeyError, TypeError, MemoryError) as error:
+    except (
+        DeltaError,
+        ArrowException,
+        OSError,
+        ValueError,
+        LookupError,
+        TypeError,
+        AttributeError,
+        MemoryError,
+    ) as error:
         raise InputError(where, f"{doing}: {brief(error)}", allowed) from error
     except BaseException as error:
         # A panic of native code is no ``Exception``.
@@ -67,7 +76,8 @@ class Storage:
             from pyarrow.fs import PyFileSystem
 
             with engine(path, "cannot be reached", "an object store the storage engine knows"):
-                self._remote = PyFileSystem(DeltaStorageHandler(path))
+                self._handler = DeltaStorageHandler(path)
+                self._remote = PyFileSystem(self._handler)
 
     @property
     def local(self) -> Path | None:
@@ -130,8 +140,10 @@ class Storage:
                     part.unlink(missing_ok=True)
                 flush(target.parent)
             else:
-                with self._remote.open_output_stream(name) as file:
-                    file.write(content)
+                # pyarrow hands its own buffers on, which the engine's files do not take.
+                file = self._handler._handler.open_output_stream(name, None)
+                file.write(content)
+                file.close()  # type: ignore[attr-defined]
 
     def remove(self, name: str) -> None:
         """Remove a file that is there. Raises ``InputError`` when it cannot be removed."""
