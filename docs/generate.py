@@ -20,9 +20,7 @@ sys.path.insert(0, str(ROOT))
 
 import ident
 from ident.analysis.derivatives import derivatives
-from ident.calibration.version import run as calibrate
 from ident.checks.findings import rules
-from ident.fitting.fit import fit
 from ident.validation.figures import case_figure
 from ident.validation.scoreboard import entries, run_all
 from sim.boat import catalogue
@@ -184,12 +182,12 @@ def main() -> int:
         raise SystemExit(f"ident was loaded from {loaded} before; run docs/generate.py by itself")
     with tempfile.TemporaryDirectory() as folder:
         db = str(Path(folder) / "coeff_db")
-        fitted = fit(ROOT / "raw_captive_data", db)[0]
+        fitted = ident.fit(ROOT / "raw_captive_data", db)[0]
         coefficients = Coefficients(fitted.campaign.vehicle, fitted.rows)
         readme = {"signs": signs(coefficients)}
         if not (only_check or chosen.quick):
             # A calibration takes minutes, so only a full run renews what follows from it.
-            calibrate("bb2", db)
+            ident.calibrate("bb2", db)
             board, flown = run_all(db, None, None)
             main_case = next(one for one in flown if one.case.name == CASE)
             case_figure(main_case, ROOT / "docs" / f"{CASE}.png")

@@ -1,3 +1,111 @@
-"""Captive submarine tests to a versioned maneuvering-coefficient database."""
+"""Captive submarine tests to a versioned maneuvering-coefficient database, and back to sea.
+
+The public names; everything else may change between versions. They are loaded when first used.
+
+Examples
+--------
+>>> import ident
+>>> ident.Database("coeff_db")[0]["N_v"].sizes
+Frozen({})
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from ident.analysis.stability import Linear, Stability, StabilityMap, stability
+    from ident.calibration.version import Calibrated, calibrate
+    from ident.captive.campaign import Campaign, read_campaign
+    from ident.checks.checked import Checked, check
+    from ident.checks.findings import Finding
+    from ident.database.compare import Change, Difference
+    from ident.database.versions import Database, DatabaseVersion
+    from ident.fitting.fit import Fit, fit
+    from ident.output import Results
+    from ident.planning.matrix import Need, Plan
+    from ident.planning.plan import plan
+    from ident.starter.write import write_starter
+    from ident.validation.result import ChannelError, Validation
+    from ident.validation.validate import validate
+    from sim.files.errors import InputError
+    from sim.flight.plant import Plant
+    from sim.flight.simulate import Simulation
+    from sim.flight.trim import NoEquilibrium
 
 __version__ = "0.1.0"
+
+# Public name -> where it lives. The rooms are named by nouns, so that none hides a function here.
+_PLACES = {
+    "read_campaign": "ident.captive.campaign",
+    "check": "ident.checks.checked",
+    "plan": "ident.planning.plan",
+    "fit": "ident.fitting.fit",
+    "calibrate": "ident.calibration.version",
+    "validate": "ident.validation.validate",
+    "stability": "ident.analysis.stability",
+    "write_starter": "ident.starter.write",
+    "Plant": "sim.flight.plant",
+    "Database": "ident.database.versions",
+    "DatabaseVersion": "ident.database.versions",
+    "Difference": "ident.database.compare",
+    "Change": "ident.database.compare",
+    "Campaign": "ident.captive.campaign",
+    "Checked": "ident.checks.checked",
+    "Finding": "ident.checks.findings",
+    "Plan": "ident.planning.matrix",
+    "Need": "ident.planning.matrix",
+    "Fit": "ident.fitting.fit",
+    "Calibrated": "ident.calibration.version",
+    "Validation": "ident.validation.result",
+    "ChannelError": "ident.validation.result",
+    "Simulation": "sim.flight.simulate",
+    "StabilityMap": "ident.analysis.stability",
+    "Stability": "ident.analysis.stability",
+    "Linear": "ident.analysis.stability",
+    "Results": "ident.output",
+    "InputError": "sim.files.errors",
+    "NoEquilibrium": "sim.flight.trim",
+}
+
+__all__ = [  # noqa: RUF022  (in the order of the work)
+    "read_campaign",
+    "check",
+    "plan",
+    "fit",
+    "calibrate",
+    "validate",
+    "stability",
+    "write_starter",
+    "Plant",
+    "Database",
+    "DatabaseVersion",
+    "Difference",
+    "Change",
+    "Campaign",
+    "Checked",
+    "Finding",
+    "Plan",
+    "Need",
+    "Fit",
+    "Calibrated",
+    "Validation",
+    "ChannelError",
+    "Simulation",
+    "StabilityMap",
+    "Stability",
+    "Linear",
+    "Results",
+    "InputError",
+    "NoEquilibrium",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _PLACES:
+        raise AttributeError(f"module 'ident' has no attribute {name!r}")
+    found = globals()[name] = getattr(import_module(_PLACES[name]), name)
+    return found
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

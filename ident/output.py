@@ -1,4 +1,4 @@
-"""Files that a command writes: checked before the work begins, and then written whole or not at all."""
+"""What leaves the program: files, written whole or not at all, and tables of a notebook."""
 
 from __future__ import annotations
 
@@ -6,8 +6,12 @@ import contextlib
 import glob
 import os
 import platform
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from html import escape
 from pathlib import Path
+from typing import Any, TypeVar
+
+T = TypeVar("T")
 
 # Folders may be shared with other machines, whose processes this one does not see.
 _HOST = platform.node().replace("/", "_")
@@ -82,3 +86,25 @@ def whole(path: Path) -> Iterator[Path]:
     finally:
         with contextlib.suppress(OSError):
             part.unlink()
+
+
+class Results(tuple[T, ...]):
+    """Results of one kind, one a campaign or state, that a notebook shows below each other."""
+
+    def to_dict(self) -> list[Any]:
+        """``to_dict()`` of each, for a program to read."""
+        return [one.to_dict() for one in self]  # type: ignore[attr-defined]
+
+    def _repr_html_(self) -> str:
+        return "".join(one._repr_html_() for one in self)  # type: ignore[attr-defined]
+
+
+def html_table(title: str, header: Iterable[str], rows: Iterable[Iterable[object]]) -> str:
+    """A table for a notebook; text is escaped, None shown as a dash."""
+
+    def cells(kind: str, values: Iterable[object]) -> str:
+        return "".join(f"<{kind}>{escape('-' if v is None else str(v))}</{kind}>" for v in values)
+
+    body = "".join(f"<tr>{cells('td', row)}</tr>" for row in rows)
+    head = f"<thead><tr>{cells('th', header)}</tr></thead>"
+    return f"<table><caption>{escape(title)}</caption>{head}<tbody>{body}</tbody></table>"

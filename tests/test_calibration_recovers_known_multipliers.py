@@ -13,7 +13,8 @@ from click.testing import CliRunner
 
 from ident.calibration.estimate import calibrate, contradictions, problem
 from ident.calibration.file import apply, load_calibration, parameters
-from ident.calibration.version import calibrated_rows, run
+from ident.calibration.version import calibrate as run
+from ident.calibration.version import calibrated_rows
 from ident.cli import main
 from ident.validation.bands import covariance
 from sim.boat.coefficients import Coefficients

@@ -20,7 +20,7 @@ from sim.boat.database import read_rows
 
 ROOT = Path(__file__).parents[1]
 PAGE = (ROOT / "docs" / "your-own-boat.md").read_text("utf-8")
-EXAMPLE = ROOT / "docs" / "example"
+EXAMPLE = ROOT / "ident" / "starter" / "files"
 BLOCKS = re.findall(r"```sh\n(.*?)\n```\n\n```text\n(.*?)\n```", PAGE, re.DOTALL)
 OPTIONS = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
 
@@ -77,7 +77,7 @@ def test_the_source_on_the_page_is_the_campaign_files():
 
 
 def _maker():
-    spec = importlib.util.spec_from_file_location("make_example", EXAMPLE / "make.py")
+    spec = importlib.util.spec_from_file_location("make_example", ROOT / "docs" / "make_example.py")
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module

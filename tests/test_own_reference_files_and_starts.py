@@ -31,8 +31,8 @@ def _own(path, name="turn20_23.69m.csv", turn=None):
 
 
 def test_bundled_file_given_as_own_gives_the_bundled_errors(tmp_path, fitted_db):
-    bundled = validate("turn20-23.69m", fitted_db).result
-    own = validate("turn20-23.69m", fitted_db, reference_file=_own(tmp_path / "mine.csv")).result
+    bundled = validate("turn20-23.69m", fitted_db).to_dict()
+    own = validate("turn20-23.69m", fitted_db, reference=_own(tmp_path / "mine.csv")).to_dict()
     assert own["references"] == bundled["references"]
     assert own["metrics"] == bundled["metrics"]
     assert own["references"]["CFD"]["x"]["ratio"] > 0.0
@@ -45,12 +45,9 @@ def test_frame_option_turns_the_file(tmp_path, fitted_db):
         return table.assign(value=table["value"].where(table["channel"] != "x", -table["value"]))
 
     path = _own(tmp_path / "mine.csv", turn=turn)
-    bundled = validate("turn20-23.69m", fitted_db).result["references"]
-    assert (
-        validate("turn20-23.69m", fitted_db, reference_file=path, reference_frame="program").result["references"]
-        == bundled
-    )
-    wrong = validate("turn20-23.69m", fitted_db, reference_file=path, reference_frame="source").result["references"]
+    bundled = validate("turn20-23.69m", fitted_db).to_dict()["references"]
+    assert validate("turn20-23.69m", fitted_db, reference=path, frame="program").to_dict()["references"] == bundled
+    wrong = validate("turn20-23.69m", fitted_db, reference=path, frame="source").to_dict()["references"]
     assert wrong["CFD"]["x"]["rmse"] > bundled["CFD"]["x"]["rmse"]
 
 
@@ -61,8 +58,8 @@ def test_every_channel_of_the_simulation_is_compared(tmp_path, fitted_db):
     rows += [("HDM", "theta", x, 0.02 * x, "deg") for x in t]
     path = tmp_path / "mine.csv"
     pd.DataFrame(rows, columns=["source", "channel", "t", "value", "unit"]).to_csv(path, index=False)
-    assert validate("vzz10-15kt", fitted_db).result["references"] == {}
-    found = validate("vzz10-15kt", fitted_db, reference_file=path).result["references"]
+    assert validate("vzz10-15kt", fitted_db).to_dict()["references"] == {}
+    found = validate("vzz10-15kt", fitted_db, reference=path).to_dict()["references"]
     assert set(found) == {"TANK"}
     assert set(found["TANK"]) == {"theta", "q"}
     # 0.01 t against 0.02 t: root mean square of 0.01 t.
@@ -105,14 +102,14 @@ def test_mistake_in_an_own_reference_is_named(tmp_path, fitted_db, text, words):
     path = tmp_path / "mine.csv"
     path.write_text(text, encoding="latin-1")
     with pytest.raises(InputError) as caught:
-        validate("vzz10-15kt", fitted_db, reference_file=path)
+        validate("vzz10-15kt", fitted_db, reference=path)
     for word in words:
         assert word in str(caught.value)
 
 
 def test_missing_own_reference_is_named(tmp_path, fitted_db):
     with pytest.raises(InputError, match="no such file"):
-        validate("vzz10-15kt", fitted_db, reference_file=tmp_path / "none.csv")
+        validate("vzz10-15kt", fitted_db, reference=tmp_path / "none.csv")
 
 
 def test_track_is_compared_at_equal_path_length(coefficients):
@@ -132,7 +129,7 @@ def test_track_is_compared_at_equal_path_length(coefficients):
 
 def test_reading_error_is_reported_and_not_taken_off(fitted_db):
     """Root mean square of the sigma column, beside the same RMSE as without it."""
-    found = validate("turn20-23.69m", fitted_db).result["references"]["CFD"]["x"]
+    found = validate("turn20-23.69m", fitted_db).to_dict()["references"]["CFD"]["x"]
     table = pd.read_csv(DATA / "turn20_23.69m.csv")
     sigma = table[(table["source"] == "CFD") & (table["channel"] == "x")]["sigma"]
     assert found["reference_sigma"] == pytest.approx(np.sqrt(np.mean(sigma**2)))
@@ -162,8 +159,8 @@ def test_source_with_its_own_start_is_held_against_a_flight_from_there(fitted_db
     for source, flight in flights.items():
         t, u, _ = reference[source]["u"]
         expected = np.sqrt(np.mean((np.interp(t, flight["t"], flight["u"]) - u) ** 2))
-        assert done.result["references"][source]["u"]["rmse"] == pytest.approx(expected, rel=1e-9)
-    assert done.result["metrics"]["execute_2_s"]["simulated_as_EXP"] == pytest.approx(flights["EXP"].executes[1, 0])
+        assert done.to_dict()["references"][source]["u"]["rmse"] == pytest.approx(expected, rel=1e-9)
+    assert done.to_dict()["metrics"]["execute_2_s"]["simulated_as_EXP"] == pytest.approx(flights["EXP"].executes[1, 0])
 
 
 def test_bands_of_a_source_with_its_own_start_start_there(campaign, rows, tmp_path):
@@ -183,6 +180,6 @@ def test_bands_of_a_source_with_its_own_start_start_there(campaign, rows, tmp_pa
 
 def test_other_vehicle_by_option(fitted_db):
     """The standard maneuvers name bb2, and fly any vehicle of the database."""
-    assert validate("meander", fitted_db, vehicle_name="bb2").result["vehicle"] == "bb2"
+    assert validate("meander", fitted_db, vehicle="bb2").to_dict()["vehicle"] == "bb2"
     with pytest.raises(InputError, match="no such file or bundled name"):
-        validate("meander", fitted_db, vehicle_name="bb3")
+        validate("meander", fitted_db, vehicle="bb3")

@@ -24,7 +24,6 @@ from ident.identification.identify import identify
 from ident.identification.solver import Solver
 from ident.planning.candidates import Facility, Levels, planned_tests, read_facility
 from ident.planning.design import Design, d_optimal, fewest_runs
-from ident.planning.matrix import matrix
 from ident.planning.plan import make_plan, planned_campaign
 from sim.boat.catalogue import OUTPUTS
 from sim.boat.forces import multiplier
@@ -225,7 +224,7 @@ def test_the_matrix_can_be_run_and_read_back(bb2_plan, campaign, tmp_path):
     """The CSV with loads added is a file of the campaign, and gives every planned value."""
     folder = tmp_path / "bb2"
     shutil.copytree(BB2, folder)
-    table = matrix(bb2_plan, campaign).drop(columns=["repeats", "identifies"])
+    table = bb2_plan.matrix.drop(columns=["repeats", "identifies"])
     units = {o: f"{o}_N" if o in "XYZ" else f"{o}_Nm" for o in OUTPUTS}
     done = table.assign(**dict.fromkeys(units.values(), 1.0), rel_sigma=0.05, quality="as_published", source="planned")
     done.to_csv(folder / "planned.csv", index=False)

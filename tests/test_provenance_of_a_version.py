@@ -79,7 +79,7 @@ def test_the_version_holds_every_conversion_of_the_file(fitted):
 
 def test_the_same_is_in_the_summary_a_program_reads(fitted):
     done, db = fitted
-    assert done.summary()["conversions"] == json.loads(versions(db)[-1].metadata["conversions"])
+    assert done.to_dict()["conversions"] == json.loads(versions(db)[-1].metadata["conversions"])
 
 
 def test_the_report_shows_it_in_the_order_it_was_done(fitted, tmp_path):
@@ -141,7 +141,7 @@ def test_the_report_says_what_it_wrote(fitted, tmp_path):
     assert not set(found["absent"]) & set(one.rows["coefficient"])
     counts = pd.Series([f.severity for f in one.findings]).value_counts()
     assert found["findings"] == {k: int(counts.get(k, 0)) for k in ("error", "warning", "info")}
-    assert (found["warnings"], found["unused"]) == (len(one.found.warnings), len(one.found.unused))
+    assert (found["warnings"], found["unused"]) == (len(one.identification.warnings), len(one.identification.unused))
 
 
 @pytest.mark.parametrize("kind", ["csv", "parquet", "json"])

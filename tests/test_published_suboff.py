@@ -13,7 +13,7 @@ import pytest
 from click.testing import CliRunner
 
 from ident.analysis.derivatives import checks
-from ident.analysis.stability import stability
+from ident.analysis.stability import stability_at
 from ident.captive.campaign import read_campaign
 from ident.cli import main
 from ident.database.store import commit, database_rows
@@ -121,7 +121,7 @@ def test_report_shows_the_published_derivatives_as_its_own(both, tmp_path):
 
 def test_indices_of_the_appended_model_through_the_chain(coefficients, printed):
     """Database to stability: the closed form to 4 digits, the print to its rounding."""
-    found = stability(coefficients, WATER, SPEED, DEPTH)
+    found = stability_at(coefficients, WATER, SPEED, DEPTH)
     mass, k = 0.018333, printed
     vertical = 1.0 - k["M_w"] * (k["Z_uq"] + mass) / (k["Z_w"] * k["M_uq"])
     horizontal = 1.0 - k["N_v"] * (k["Y_ur"] - mass) / (k["Y_v"] * k["N_ur"])
@@ -140,7 +140,7 @@ def test_indices_of_the_appended_model_through_the_chain(coefficients, printed):
 def test_index_of_each_configuration_through_the_chain(name):
     """The mass of these comes from the index itself, so this tests the chain, not the data."""
     vehicle = load_vehicle(f"suboff-{name}")
-    found = stability(Coefficients(vehicle, _rows(SUBOFF / "configurations" / name)), WATER, SPEED, DEPTH)
+    found = stability_at(Coefficients(vehicle, _rows(SUBOFF / "configurations" / name)), WATER, SPEED, DEPTH)
     assert found.g_horizontal == pytest.approx(CONFIGURATIONS[name], rel=5e-5)
     # Nothing vertical and no added mass is published: no number is made up for them.
     assert found.g_vertical is None
@@ -166,7 +166,7 @@ def _closed_form(printed, vehicle, speed):
 
 @pytest.mark.parametrize("speed", [1.0, SPEED])
 def test_eigenvalues_are_the_closed_form_to_four_digits(coefficients, printed, speed):
-    found = stability(coefficients, WATER, speed, DEPTH)
+    found = stability_at(coefficients, WATER, speed, DEPTH)
     for values, wanted in zip((found.vertical, found.horizontal), _closed_form(printed, coefficients.vehicle, speed)):
         roots = np.array([complex(*v) for v in values])
         for root in wanted:
@@ -176,8 +176,8 @@ def test_eigenvalues_are_the_closed_form_to_four_digits(coefficients, printed, s
 def test_without_stand_ins_the_speed_is_held_and_the_roots_stay(tmp_path, coefficients):
     folder = tmp_path / "suboff"
     shutil.copytree(SUBOFF, folder, ignore=shutil.ignore_patterns("estimates.csv", "stand_in*", "configurations"))
-    bare = stability(Coefficients(load_vehicle("suboff"), _rows(folder)), WATER, SPEED, DEPTH)
-    full = stability(coefficients, WATER, SPEED, DEPTH)
+    bare = stability_at(Coefficients(load_vehicle("suboff"), _rows(folder)), WATER, SPEED, DEPTH)
+    full = stability_at(coefficients, WATER, SPEED, DEPTH)
     assert (bare.about, full.about) == ("speed held", "self-propulsion")
     assert bare.g_vertical == pytest.approx(full.g_vertical, rel=1e-4)
     assert bare.vertical[0] == pytest.approx(full.vertical[0], rel=1e-4)

@@ -50,7 +50,7 @@ def _entries(board):
 
 
 def test_every_error_is_that_of_a_single_run_of_its_version(database, board):
-    own = {name: [validate(name, database, v).result["references"] for v in (2, 0)] for name in CASES[:3]}
+    own = {name: [validate(name, database, v).to_dict()["references"] for v in (2, 0)] for name in CASES[:3]}
     seen = 0
     for case, source, channel, entry in _entries(board):
         this, parent = (one[source][channel] for one in own[case["case"]])

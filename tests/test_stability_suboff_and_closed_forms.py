@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.linalg import expm
 
-from ident.analysis.stability import critical_speed, stability, stability_index
+from ident.analysis.stability import critical_speed, stability_at, stability_index
 from sim.flight.case import load_case
 from sim.flight.plant import Plant
 from sim.flight.simulate import mixer_of, plane_limits
@@ -85,7 +85,7 @@ def test_planes_at_the_neutral_point_never_reverse():
 
 def test_bb2_horizontal_index_agrees_with_its_roots(coefficients, environment):
     """BB2 is directionally stable deep at 10 kts: Gh > 0 and no growing lateral root."""
-    found = stability(coefficients, environment, 5.14444, 23.69)
+    found = stability_at(coefficients, environment, 5.14444, 23.69)
     assert found.g_horizontal > 0.0
     assert found.horizontal[0][0] < 0.0
 
@@ -96,7 +96,7 @@ def test_least_stable_lateral_root_is_seen_in_a_flight(coefficients, environment
     from sim.flight.case import load_case
     from sim.flight.simulate import settings_of
 
-    found = stability(coefficients, environment, 5.14444, 23.69)
+    found = stability_at(coefficients, environment, 5.14444, 23.69)
     model = assemble(coefficients, environment)
     vehicle = coefficients.vehicle
     trim = self_propulsion(model, mixer_of(vehicle), 5.14444, 23.69, plane_limits(vehicle)[0])
@@ -118,7 +118,7 @@ def test_linear_model_moves_as_the_boat_does_by_a_small_command(coefficients, en
     case = load_case("turning-circle")[0]
     boat = Plant(case, coefficients)
     speed, depth = case.initial.speed_mps, case.initial.depth_m
-    linear = stability(coefficients, environment, speed, depth).linear[plane]
+    linear = stability_at(coefficients, environment, speed, depth).linear[plane]
     assert linear.command == command
     assert linear.about == pytest.approx([boat[name] for name in linear.states], abs=1e-9)
     size, time = math.radians(0.5), 12.0

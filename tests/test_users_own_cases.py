@@ -28,7 +28,7 @@ def write(tmp_path):
 
 
 def test_own_case_gives_what_the_bundled_one_gives(write, fitted_db):
-    own, bundled = (validate(name, fitted_db).result for name in (write(), "roll-decay"))
+    own, bundled = (validate(name, fitted_db).to_dict() for name in (write(), "roll-decay"))
     assert own["references"] == bundled["references"]
     assert own["metrics"] == bundled["metrics"]
 
@@ -39,8 +39,8 @@ def test_reference_in_degrees_gives_the_same_error_in_degrees(write, fitted_db):
     for line in lines[1:]:
         source, channel, t, value, _, *rest = line.split(",")
         turned.append(",".join([source, channel, t, repr(float(value) * 57.29577951308232), "deg", *rest]))
-    found = validate(write(series="\n".join(turned)), fitted_db).result["references"]["EXP"]["phi"]
-    known = validate("roll-decay", fitted_db).result["references"]["EXP"]["phi"]
+    found = validate(write(series="\n".join(turned)), fitted_db).to_dict()["references"]["EXP"]["phi"]
+    known = validate("roll-decay", fitted_db).to_dict()["references"]["EXP"]["phi"]
     assert found["unit"] == "deg"
     assert found["rmse"] == pytest.approx(known["rmse"] * 57.29577951308232)
     assert found["ratio"] == pytest.approx(known["ratio"])

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import os
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -10,15 +12,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ident.analysis.derivatives import loads, prime_scale, slope, steps
+from ident.output import html_table
 from sim.boat.catalogue import OUTPUTS, STATES
 from sim.boat.coefficients import Coefficients
-from sim.boat.vehicle import Vehicle
-from sim.flight.simulate import mixer_of, plane_limits
+from sim.boat.database import read_rows
+from sim.boat.vehicle import Vehicle, load_vehicle
+from sim.files.errors import InputError
+from sim.flight.case import load_case
+from sim.flight.simulate import environment_of, mixer_of, plane_limits
 from sim.flight.trim import NoEquilibrium, self_propulsion
 from sim.kernel import rhs as kernel
 from sim.kernel.assemble import Environment, added_mass_matrix, assemble
 
 if TYPE_CHECKING:
+    import pandas as pd
     from rich.console import Console
 
 Array = NDArray[np.float64]
@@ -30,6 +37,8 @@ _VERTICAL_INERTIA, _HORIZONTAL_INERTIA = (2, 4), (1, 5)
 _PLANES = ("vertical", "horizontal")
 _TABLE_STEP = 1e-4
 _DEFLECTION = math.radians(1.0)
+_TABLED = ("speed", "depth", "g_vertical", "g_horizontal", "neutral_point_vertical", "neutral_point_horizontal")
+_TABLED += ("critical_speed_stern", "critical_speed_sail")
 
 
 @dataclass(frozen=True)
@@ -42,6 +51,14 @@ class Linear:
     command : dV or dH [rad], through the mixer; without the delay of the actuators.
     a, b : (n, n) and (n,).
     about : (n,) values of the states that x are the changes from.
+
+    Examples
+    --------
+    >>> import ident
+    >>> (state,) = ident.stability("my-boat/zigzag.toml", db="coeff_db", speeds=[5.0], depths=[40.0])
+    >>> linear = state.linear["horizontal"]
+    >>> linear.states, linear.command
+    (('v', 'p', 'r', 'phi'), 'dH')
     """
 
     states: tuple[str, ...]
@@ -70,6 +87,13 @@ class Stability:
     linear : The linear models these are of, vertical and horizontal, as far as there are any.
     about : ``self-propulsion``, or ``speed held``: straight and level with the planes at
         zero and without surge, for a vehicle without propulsion data.
+
+    Examples
+    --------
+    >>> import ident
+    >>> (state,) = ident.stability("my-boat/zigzag.toml", db="coeff_db", speeds=[5.0], depths=[40.0])
+    >>> state.g_horizontal > 0.0, state.about
+    (True, 'self-propulsion')
     """
 
     speed: float
@@ -84,6 +108,54 @@ class Stability:
     horizontal: list[tuple[float, float]]
     linear: dict[str, Linear]
     about: str
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data; eigenvalues as (real, imaginary), linear models as states, command, a, b, about."""
+        return asdict(self)
+
+
+@dataclass(frozen=True)
+class StabilityMap:
+    """Stability of straight level motion over speeds and depths.
+
+    Attributes
+    ----------
+    title : The vehicle's.
+    version : Of the database.
+    states : Depth by depth.
+
+    Examples
+    --------
+    >>> import ident
+    >>> found = ident.stability("my-boat/zigzag.toml", db="coeff_db", speeds=[3.0, 5.0], depths=[40.0])
+    >>> found.table[["speed", "depth"]].values.tolist()
+    [[3.0, 40.0], [5.0, 40.0]]
+    """
+
+    title: str
+    version: int
+    states: tuple[Stability, ...]
+
+    def __len__(self) -> int:
+        return len(self.states)
+
+    def __iter__(self) -> Iterator[Stability]:
+        return iter(self.states)
+
+    @property
+    def table(self) -> pd.DataFrame:
+        """One row a state: speed, depth, indices, neutral points, critical speeds."""
+        import pandas as pd
+
+        return pd.DataFrame([{k: getattr(s, k) for k in _TABLED} for s in self.states], columns=list(_TABLED))
+
+    def to_dict(self) -> list[dict[str, Any]]:
+        """``to_dict()`` of every state."""
+        return [s.to_dict() for s in self.states]
+
+    def _repr_html_(self) -> str:
+        rows = [["-" if x is None else f"{x:.4g}" for x in row] for row in self.table.itertuples(index=False)]
+        return html_table(f"{self.title}, database version {self.version}", _TABLED, rows)
 
 
 def stability_index(force: float, moment: float, force_rate: float, moment_rate: float, mass: float) -> float:
@@ -190,7 +262,7 @@ def _linear_models(
     return found, about
 
 
-def stability(coefficients: Coefficients, environment: Environment, speed: float, depth: float) -> Stability:
+def stability_at(coefficients: Coefficients, environment: Environment, speed: float, depth: float) -> Stability:
     """Stability of straight level motion.
 
     Parameters
@@ -251,19 +323,70 @@ def stability(coefficients: Coefficients, environment: Environment, speed: float
     )
 
 
-def as_json(found: list[Stability]) -> list[dict[str, Any]]:
-    """The results as plain data; eigenvalues as [real, imaginary], linear models as states, command, a, b, about."""
-    return [asdict(s) for s in found]
+def stability(
+    case: str | os.PathLike[str],
+    db: str | os.PathLike[str] = "coeff_db",
+    version: int | None = None,
+    speeds: Sequence[float] = (),
+    depths: Sequence[float] = (),
+) -> StabilityMap:
+    """Stability indices, eigenvalues and critical speeds of a database version over speed and depth.
+
+    Parameters
+    ----------
+    case : Bundled name or path of the case that gives vehicle, water and gravity.
+    db, version : Folder or URL of the database, and version, latest when None.
+    speeds : U [m/s]; those of the tabulated drift loads when empty, else the case's.
+    depths : D0, depth of the sail top [m]; likewise.
+
+    Returns
+    -------
+    StabilityMap
+
+    Raises
+    ------
+    InputError
+        For a case, vehicle, database or version that does not exist, or a speed or depth that
+        is not a finite number in range.
+
+    References
+    ----------
+    .. [1] Feldman, J., "Straightline and rotating arm captive-model experiments to investigate
+       the stability and control characteristics of submarines and other submerged vehicles",
+       DTRC/SHD-0303-20, 1987.
+
+    Examples
+    --------
+    >>> import ident
+    >>> found = ident.stability("my-boat/zigzag.toml", db="coeff_db", speeds=[5.0], depths=[40.0])
+    >>> [state.linear["vertical"].command for state in found]
+    ['dV']
+    """
+    data, where = load_case(os.fspath(case))
+    vehicle = load_vehicle(data.vehicle, beside=where)
+    rows, number = read_rows(os.fspath(db), version, vehicle.name)
+    for name, values, least in (("speed", speeds, 0.0), ("depth", depths, None)):
+        for value in values:
+            if not math.isfinite(value) or (least is not None and value <= least):
+                text = "a finite number" + (" above zero" if least is not None else "")
+                raise InputError(f"stability, {name}", f"{value:g}", text)
+    drift = rows[rows["output"].eq("N") & rows["beta_deg"].notna()]
+    speeds = speeds or tuple(sorted(drift["speed_mps"].dropna().unique())) or (data.initial.speed_mps,)
+    depths = depths or tuple(sorted(drift["depth_m"].dropna().unique())) or (data.initial.depth_m,)
+    coefficients = Coefficients(vehicle, rows)
+    environment = environment_of(data)
+    found = [stability_at(coefficients, environment, u, d) for d in depths for u in speeds]
+    return StabilityMap(vehicle.title, number, tuple(found))
 
 
-def show(found: list[Stability], title: str, console: Console) -> None:
+def show(found: StabilityMap, console: Console) -> None:
     """Print the results as a table."""
     from rich.table import Table
 
     table = Table(
         *("U [m/s]", "D0 [m]", "Gv", "Gh", "neutral point v, h [L]", "critical speed stern, sail [m/s]"),
         *("vertical [1/s]", "horizontal [1/s]"),
-        title=title,
+        title=f"{found.title}, database version {found.version}",
     )
 
     def speed(value: float | None) -> str:

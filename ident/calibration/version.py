@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
@@ -11,10 +12,12 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from ident.calibration.estimate import Channel, Estimate, Problem, calibrate, contradictions, problem
+from ident.calibration.estimate import Channel, Estimate, Problem, contradictions, problem
+from ident.calibration.estimate import calibrate as most_probable
 from ident.calibration.file import Parameter, apply, load_calibration, parameters
 from ident.database.lock import WAIT
 from ident.database.store import commit, digest
+from ident.output import html_table
 from sim.boat.database import NUMBERS, Version, column_order, own_version, read_rows, versions
 from sim.boat.row_codec import correlation_matrix, correlation_texts
 from sim.boat.vehicle import load_vehicle
@@ -39,14 +42,50 @@ class Calibrated:
 
     Attributes
     ----------
-    summary : What a machine reads, and what the version's metadata holds.
-    version, new, digest : As of a fit.
+    summary : Priors, posteriors, series, what was left out and warnings, as the version's
+        metadata holds them.
+    version : Number of the version that holds the calibrated rows.
+    new : False when the latest version held them already.
+    digest : SHA-256 of the content of the rows.
+
+    Examples
+    --------
+    >>> import ident
+    >>> done = ident.calibrate("bb2", db="bb2_db")  # doctest: +SKIP
+    >>> done.groups.loc["stern_planes", ["prior", "posterior"]]  # doctest: +SKIP
     """
 
     summary: dict[str, Any]
     version: int
     new: bool
     digest: str
+
+    @property
+    def groups(self) -> pd.DataFrame:
+        """One row a group: prior, its sigma, captive error, posterior, its sigma, and the verdict."""
+        rows = [
+            {
+                "group": g["name"],
+                "prior": g["prior"]["mean"],
+                "prior_sigma": g["prior"]["sigma"],
+                "captive_sigma": g["captive_sigma"],
+                "posterior": g["posterior"]["value"],
+                "posterior_sigma": g["posterior"]["sigma"],
+                "verdict": verdict(g),
+            }
+            for g in self.summary["groups"]
+        ]
+        return pd.DataFrame(rows).set_index("group")
+
+    def to_dict(self) -> dict[str, Any]:
+        """The calibration for a program to read."""
+        return {**self.summary, "version": self.version, "new": self.new, "digest": self.digest}
+
+    def _repr_html_(self) -> str:
+        title = f"{self.summary['calibration']}: version {self.version}, digest {self.digest[:16]}"
+        table = self.groups
+        rows = [(name, *(f"{x:.3g}" for x in row[:5]), row[5]) for name, *row in table.itertuples()]
+        return html_table(title, ("group", *table.columns), rows)
 
 
 def captive_version(db: str, vehicle: str, number: int | None) -> Version:
@@ -141,7 +180,7 @@ def _left_out(task: Problem, whole: Estimate, workers: int | None, each: Callabl
         if not rest.channels:
             continue
         each(f"without {out[0]} {out[1]}")
-        estimate = calibrate(rest, workers, lambda text: None, whole.theta)
+        estimate = most_probable(rest, workers, lambda text: None, whole.theta)
         residuals = task.residuals(estimate.theta)
         predicted = {
             c.key[2]: float(np.sqrt(np.mean(r**2))) for c, r in zip(task.channels, residuals, strict=True) if dropped(c)
@@ -215,9 +254,9 @@ def _rounded(estimate: Estimate) -> Estimate:
     )
 
 
-def run(
-    name: str,
-    db: str,
+def calibrate(
+    name: str | os.PathLike[str],
+    db: str | os.PathLike[str] = "coeff_db",
     version: int | None = None,
     message: str = "",
     left_out: bool = True,
@@ -225,30 +264,44 @@ def run(
     each: Callable[[str], None] = lambda text: None,
     wait: float = WAIT,
 ) -> Calibrated:
-    """Calibrate a captive version and commit the result.
+    """Estimate multipliers of coefficient groups from free-running maneuvers; commit the result.
+
+    The new version has the captive one as its parent, and covariances of the posterior.
 
     Parameters
     ----------
     name : Bundled calibration or path to one.
-    db, version : Database and captive version; the latest captive one when None.
+    db, version : Folder or URL of the database, and captive version; the latest captive one when None.
     message : Stored with the version.
     left_out : Also calibrate without each source in turn.
     workers : Threads; the result does not depend on it.
     each : Called with a line of text as the work goes on.
     wait : How long to wait for other writers of the database [s].
 
+    Returns
+    -------
+    Calibrated
+
     Raises
     ------
     InputError
         For a calibration, case, reference, database or version that does not exist or fit.
+
+    Examples
+    --------
+    The bundled calibration takes minutes; with a file of your own, see the page on calibration.
+
+    >>> import ident
+    >>> done = ident.calibrate("bb2", db="bb2_db")  # doctest: +SKIP
     """
+    name, db = os.fspath(name), os.fspath(db)
     spec, where, own = load_calibration(name)
     vehicle = load_vehicle(spec.vehicle, beside=where)
     base = captive_version(db, vehicle.name, version)
     rows, _ = read_rows(db, base.number, vehicle.name)
     chosen = parameters(spec, vehicle, rows, where)
     task = problem(spec, where, vehicle, rows, chosen)
-    estimate = calibrate(task, workers, each)
+    estimate = most_probable(task, workers, each)
     estimate = _rounded(estimate)
     theta, sigma = [float(x) for x in estimate.theta], [float(x) for x in estimate.deviation]
     without = _left_out(task, estimate, workers, each) if left_out else []
@@ -294,7 +347,7 @@ def run(
     return Calibrated(summary, number, new, digest(done))
 
 
-_FIT = ("conversions", "options", "unused", "warnings", "quality", "checks")
+_FIT = ("conversions", "options", "unused", "warnings", "quality", "checks", "runs")
 
 
 def show(done: Calibrated, console: Console) -> None:

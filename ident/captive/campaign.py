@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import glob
 import hashlib
+import os
 from dataclasses import dataclass, field
 from functools import cache
 from importlib.resources import files
@@ -33,6 +34,7 @@ from ident.captive.readers.opening import inputs
 from ident.captive.run_table import DIRECT, MEASURED, NUMBERS, run_table, sigma
 from ident.captive.runs import Found, source_runs
 from ident.captive.source import Source
+from ident.output import html_table
 from sim.boat.catalogue import OUTPUTS
 from sim.boat.vehicle import Vehicle, load_vehicle
 from sim.files.errors import InputError
@@ -57,6 +59,13 @@ class Campaign:
     digests : SHA-256 of every input file.
     reduced : The time histories that were reduced to runs, for their plots.
     refused : Those that were left out because their time stamps do not rise.
+
+    Examples
+    --------
+    >>> import ident
+    >>> campaign = ident.read_campaign("my-boat/captive")
+    >>> drift = campaign.runs[campaign.runs["test"] == "drift_horizontal"]
+    >>> drift.plot.scatter("beta", "N")  # doctest: +SKIP
     """
 
     header: CampaignFile
@@ -65,6 +74,12 @@ class Campaign:
     digests: dict[str, str] = field(default_factory=dict)
     reduced: tuple[Reduced, ...] = ()
     refused: tuple[NotRising, ...] = ()
+
+    def _repr_html_(self) -> str:
+        groups = self.runs.groupby(["file", "test", "part"], sort=False)
+        rows = [(*key, len(g), " ".join(o for o in OUTPUTS if g[o].notna().any())) for key, g in groups]
+        title = f"{self.header.name} of {self.vehicle.title}: {len(self.runs)} runs"
+        return html_table(title, ("file", "test", "part", "runs", "loads"), rows)
 
 
 @cache
@@ -188,8 +203,8 @@ def _check_complete(folder: Path, runs: pd.DataFrame) -> None:
                 raise InputError(f"{place}, column rel_sigma", "nothing", f"a number, or sigma_{bare[0]}_<unit>")
 
 
-def read_campaign(folder: Path, leave_out: bool = False) -> Campaign:
-    """Read and turn one campaign.
+def read_campaign(folder: str | os.PathLike[str], leave_out: bool = False) -> Campaign:
+    """Read one captive campaign and turn it to the program frame.
 
     Parameters
     ----------
@@ -206,7 +221,15 @@ def read_campaign(folder: Path, leave_out: bool = False) -> Campaign:
     InputError
         For anything a user can mend: missing file or column, unknown test, unit, part or
         quality word, text or a non-finite number, a frame that is not declared.
+
+    Examples
+    --------
+    >>> import ident
+    >>> campaign = ident.read_campaign("my-boat/captive")
+    >>> campaign.runs.set_index("run_id").loc["OW-0.4", ["file", "row", "source"]].astype(str).tolist()
+    ['open_water.csv', '4', 'computed']
     """
+    folder = Path(folder)
     header, raw = read_header(folder)
     where = str(folder / "campaign.toml")
     vehicle = load_vehicle(header.vehicle, beside=folder / "campaign.toml")

@@ -7,6 +7,7 @@ derivatives, registered by name; ``data/checks.csv`` holds their limits and reme
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -189,7 +190,7 @@ def refuse_errors(folder: Path, findings: list[Finding]) -> None:
     raise InputError(place, f"{first.what} (check {first.check})", first.remedy + rest)
 
 
-def table(findings: list[Finding], title: str) -> Table:
+def table(findings: Sequence[Finding], title: str) -> Table:
     """The findings as a table for the screen."""
     from rich.markup import escape
     from rich.table import Table
@@ -208,7 +209,7 @@ def table(findings: list[Finding], title: str) -> Table:
     return shown
 
 
-def show(findings: list[Finding], title: str, console: Console) -> None:
+def show(findings: Sequence[Finding], title: str, console: Console) -> None:
     """Print the findings, or that there are none."""
     if findings:
         console.print(table(findings, title))

@@ -54,7 +54,7 @@ def film(
 
     Parameters
     ----------
-    case, db, version, vehicle : As for ``ident.validation.validate.validate``.
+    case, db, version, vehicle : As for ``ident.validate``.
     out : File; the case's name as GIF when None.
     pictures : Number of frames, frames a second, start and end [s] or None.
     json_path : Where to write what was drawn as JSON, ``-`` for standard output.
@@ -66,9 +66,9 @@ def film(
     """
     from rich.progress import Progress
 
+    import ident
     from ident.animation.film import animate as draw
     from ident.animation.film import writer_of
-    from ident.validation.validate import validate
     from sim.boat.database import version_words
 
     frames, fps, start, end = pictures
@@ -76,8 +76,8 @@ def film(
     if out is not None:
         writer_of(out, fps)
     with equilibrium_of(case), console.status("flying the case"):
-        done = validate(case, db, version, vehicle)
-    database = done.result["database"]
+        done = ident.validate(case, db, version, vehicle=vehicle)
+    database = done.database
     title = f"{done.case.title}, {done.case.vehicle}; {version_words(database)}"
     path = out or Path(f"{done.case.name}.gif")
     with Progress(console=console, transient=True) as progress:

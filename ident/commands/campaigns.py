@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import Any
 
 import click
 
@@ -26,16 +25,16 @@ def fit(folder: Path, db: str, message: str, json_path: str | None, strict: bool
     \b
     Example: ident fit raw_captive_data/ --db coeff_db
     """
-    from ident.fitting.fit import fit as run
+    import ident
     from ident.fitting.fit import show
 
     console = console_for(quiet=json_path == "-")
     with console.status("reading, checking and identifying"):
-        done = run(folder, db, message, strict, wait)
+        done = ident.fit(folder, db, message, strict, wait)
     for one in done:
         show(one, console)
     if json_path:
-        emit([one.summary() for one in done], json_path)
+        emit(done.to_dict(), json_path)
 
 
 @click.command()
@@ -48,20 +47,17 @@ def check(folder: Path, json_path: str | None, strict: bool) -> None:
     \b
     Example: ident check raw_captive_data/ --json -
     """
-    from ident.captive.campaign import find_campaigns, read_campaign
-    from ident.checks.check import check_campaign, show
+    import ident
+    from ident.checks.check import show
 
     console = console_for(quiet=json_path == "-")
-    found: list[dict[str, Any]] = []
-    for path in find_campaigns(folder):
-        with console.status(f"checking {path}"):
-            campaign = read_campaign(path, leave_out=True)
-            findings = check_campaign(campaign, path)
-        show(findings, f"{campaign.header.name}: {len(campaign.runs)} runs", console)
-        found.append({"campaign": campaign.header.name, "findings": [f.as_json() for f in findings]})
+    with console.status("checking") as status:
+        found = ident.check(folder, lambda path: status.update(f"checking {path}"))
+    for one in found:
+        show(one.findings, f"{one.campaign.header.name}: {len(one.campaign.runs)} runs", console)
     if json_path:
-        emit(found, json_path)
-    if strict and any(f["severity"] == "error" for one in found for f in one["findings"]):
+        emit(found.to_dict(), json_path)
+    if strict and any(one.counts["error"] for one in found):
         sys.exit(1)
 
 
@@ -77,26 +73,18 @@ def plan(folder: Path, target_rel: float, facility: Path | None, out: Path | Non
     \b
     Example: ident plan raw_captive_data/bb2 --target-rel 0.1 --out plan.csv
     """
-    from ident.captive.campaign import find_campaigns, read_campaign
-    from ident.planning.candidates import read_facility
-    from ident.planning.matrix import show, summary, write_matrix
-    from ident.planning.plan import make_plan
-    from sim.files.errors import InputError
+    import ident
+    from ident.planning.matrix import show
 
-    paths = find_campaigns(folder)
-    if len(paths) > 1:
-        raise InputError(str(folder), f"{len(paths)} campaigns", "one campaign folder, such as " + str(paths[0]))
     console = console_for(quiet=json_path == "-")
-    limits = read_facility(facility) if facility else None
-    campaign = read_campaign(paths[0])
     with console.status("identifying, choosing runs, identifying again with them"):
-        made = make_plan(campaign, target_rel, limits)
-    show(made, campaign, console)
+        made = ident.plan(folder, target_rel, facility)
+    show(made, console)
     if out:
-        write_matrix(made, campaign, out)
+        made.to_csv(out)
         console.print(f"test matrix: {out}", highlight=False)
     if json_path:
-        emit(summary(made, campaign), json_path)
+        emit(made.to_dict(), json_path)
 
 
 @click.command()

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from ident.commands.shared import DB, OUT, VERSION, WAIT, console_for, emit, equilibrium_of, json_to
+
+if TYPE_CHECKING:
+    from ident.validation.result import Validation
 
 
 @click.command()
@@ -74,22 +77,23 @@ def validate(
         raise click.UsageError("--frame goes with --reference")
     console = console_for(quiet=json_path == "-")
     with equilibrium_of(case or "of --all"):
-        done, result = _one(case, db, version, own, console) if case else _all(db, version, cases, console)
+        done, board = ([_one(case, db, version, own, console)], None) if case else _all(db, version, cases, console)
     from ident.validation.figures import case_figure
 
-    bands = _bands(done[0], result, samples, seed, dask, console) if samples else None
+    if samples:
+        done = [_with_bands(done[0], samples, seed, dask, console)]
     for one in done:
-        figure = case_figure(one, out / f"{one.case.name}_v{one.result['database']['version']}.png", bands)
+        figure = case_figure(one, out / f"{one.case.name}_v{one.version}.png", one.bands)
         console.print(f"figure: {figure}", highlight=False)
     for figure in _sea_figures(done, out):
         console.print(f"figure: {figure}", highlight=False)
     if json_path:
-        emit(result, json_path)
-    if strict and not all(one.result["passed"] for one in done):
+        emit(done[0].to_dict() if board is None else board, json_path)
+    if strict and not all(one.passed for one in done):
         raise click.exceptions.Exit(1)
 
 
-def _sea_figures(done: list[Any], out: Path) -> list[Path]:
+def _sea_figures(done: list[Validation], out: Path) -> list[Path]:
     """Further figures of cases in waves."""
     if not any(one.case.waves for one in done):
         return []
@@ -98,22 +102,21 @@ def _sea_figures(done: list[Any], out: Path) -> list[Path]:
     return [figure for one in done for figure in sea_figures(one, out)] + harmonics_over_depth(done, out)
 
 
-def _one(
-    case: str, db: str, version: int | None, own: dict[str, Any], console: Any
-) -> tuple[list[Any], dict[str, Any]]:
-    from ident.validation.validate import show, validate
+def _one(case: str, db: str, version: int | None, own: dict[str, Any], console: Any) -> Validation:
+    import ident
+    from ident.validation.validate import show
 
     with console.status("flying the case (the first run on a machine compiles: half a minute, in waves two)"):
-        done = validate(case, db, version, own["vehicle"], own["reference"], own["frame"])
+        done = ident.validate(case, db, version, **own)
     show(done, console)
-    return [done], done.result
+    return done
 
 
-def _bands(one: Any, result: dict[str, Any], samples: int, seed: int, dask: str | None, console: Any) -> Any:
-    """Fly the samples with a progress bar; adds ``bands`` to the result and prints it."""
+def _with_bands(one: Validation, samples: int, seed: int, dask: str | None, console: Any) -> Validation:
+    """Fly the samples with a progress bar, and print what they say."""
     from rich.progress import Progress
 
-    from ident.validation.bands import fly_samples, show, summary
+    from ident.validation.bands import show
 
     with Progress(console=console, transient=True) as progress:
         task = progress.add_task("flying samples", total=samples)
@@ -121,14 +124,12 @@ def _bands(one: Any, result: dict[str, Any], samples: int, seed: int, dask: str 
         def each(done: int) -> None:
             progress.advance(task, done)
 
-        boat = one.boat
-        found = fly_samples(one.case, boat.vehicle, boat.rows, samples, seed, each=each, dask=dask)
-    result["bands"] = summary(found, one.case, one.reference)
-    show(result["bands"], console)
+        found = one.with_bands(samples, seed, each, dask)
+    show(found.to_dict()["bands"], console)
     return found
 
 
-def _all(db: str, version: int | None, cases: Path | None, console: Any) -> tuple[list[Any], dict[str, Any]]:
+def _all(db: str, version: int | None, cases: Path | None, console: Any) -> tuple[list[Validation], dict[str, Any]]:
     from ident.validation.scoreboard import run_all, show
 
     with console.status("flying") as status:
@@ -157,14 +158,15 @@ def calibrate(
     Example: ident calibrate bb2
              ident calibrate my_boat.toml --no-left-out --json -
     """
-    from ident.calibration.version import run, show
+    import ident
+    from ident.calibration.version import show
 
     console = console_for(quiet=json_path == "-")
     with console.status("calibrating") as status:
-        done = run(name, db, version, message, left_out, each=status.update, wait=wait)
+        done = ident.calibrate(name, db, version, message, left_out, each=status.update, wait=wait)
     show(done, console)
     if json_path:
-        emit({**done.summary, "version": done.version, "new": done.new, "digest": done.digest}, json_path)
+        emit(done.to_dict(), json_path)
 
 
 @click.command()
@@ -189,28 +191,15 @@ def stability(
     \b
     Example: ident stability --speed 3 --speed 5 --depth 25
     """
-    from ident.analysis.stability import as_json, show
-    from ident.analysis.stability import stability as at
-    from sim.boat.coefficients import Coefficients
-    from sim.boat.database import read_rows
-    from sim.boat.vehicle import load_vehicle
-    from sim.flight.case import load_case
-    from sim.kernel.assemble import Environment
+    import ident
+    from ident.analysis.stability import show
 
-    data, where = load_case(case)
-    vehicle = load_vehicle(data.vehicle, beside=where)
-    rows, number = read_rows(db, version, vehicle.name)
-    drift = rows[rows["output"].eq("N") & rows["beta_deg"].notna()]
     for name, values in (("speed", speeds), ("depth", depths)):
         if any(not math.isfinite(v) for v in values):
             raise click.UsageError(f"--{name} is a finite number")
-    speeds = speeds or tuple(sorted(drift["speed_mps"].dropna().unique())) or (data.initial.speed_mps,)
-    depths = depths or tuple(sorted(drift["depth_m"].dropna().unique())) or (data.initial.depth_m,)
-    environment = Environment(data.environment.density_kgpm3, data.environment.gravity_mps2)
-    coefficients = Coefficients(vehicle, rows)
     console = console_for(quiet=json_path == "-")
     with console.status("linearising"):
-        found = [at(coefficients, environment, u, d) for d in depths for u in speeds]
-    show(found, f"{vehicle.title}, database version {number}", console)
+        found = ident.stability(case, db, version, speeds, depths)
+    show(found, console)
     if json_path:
-        emit(as_json(found), json_path)
+        emit(found.to_dict(), json_path)

@@ -46,20 +46,11 @@ def versions(db: str, json_path: str | None) -> None:
     \b
     Example: ident versions --db coeff_db
     """
-    from datetime import UTC, datetime
-
     from rich.table import Table
 
-    from sim.boat.database import versions as read
+    import ident
 
-    keys = ("vehicle", "campaign", "digest", "parent", "program", "message")
-    found = []
-    for v in read(db):
-        when = datetime.fromtimestamp(int(v.timestamp) / 1000, UTC).isoformat(timespec="seconds")
-        said = {k: v.metadata.get(k, "") for k in keys}
-        if v.operation:
-            said["message"] = f"{v.operation} by another program"
-        found.append({"version": v.number, "time": when, **said})
+    found = ident.Database(db).to_dict()
     if json_path:
         emit(found, json_path)
     if json_path != "-":
@@ -82,21 +73,22 @@ def diff(first: int, second: int, db: str, json_path: str | None) -> None:
     """
     from rich.table import Table
 
-    from ident.database.compare import difference
+    import ident
 
-    found = difference(db, first, second)
+    versions = ident.Database(db)
+    found = versions[first].diff(versions[second])
     if json_path:
-        emit(found, json_path)
+        emit(found.to_dict(), json_path)
     if json_path == "-":
         return
     if not found:
         click.echo(f"versions {first} and {second} hold the same coefficients")
         return
     table = Table("coefficient", "added", "removed", "changed", "largest change", "in standard errors")
-    for row in found:
-        change = f"{100 * row['largest_relative_change']:.3g} %"
-        counts = [str(row[k]) for k in ("added", "removed", "changed")]
-        table.add_row(row["coefficient"], *counts, change, f"{row['largest_change_in_stderr']:.2f}")
+    for one in found:
+        change = f"{100 * one.largest_relative_change:.3g} %"
+        counts = [str(n) for n in (one.added, one.removed, one.changed)]
+        table.add_row(one.coefficient, *counts, change, f"{one.largest_change_in_stderr:.2f}")
     console_for().print(table)
 
 

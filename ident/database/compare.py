@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ident.output import check_folder, whole
+from ident.output import check_folder, html_table, whole
 from sim.boat.database import axis_columns, last_own, read_rows, versions
 
 if TYPE_CHECKING:
@@ -17,25 +19,76 @@ def _indexed(rows: pd.DataFrame) -> pd.DataFrame:
     return rows.set_index(keys)[["value", "stderr"]]
 
 
-def difference(db: str, first: int, second: int) -> list[dict[str, Any]]:
-    """What changed between two versions, one row a coefficient.
+@dataclass(frozen=True)
+class Change:
+    """What changed in one coefficient.
 
-    Parameters
+    Attributes
     ----------
-    db : Database path or URL.
-    first, second : Version numbers.
-
-    Returns
-    -------
-    For each coefficient that differs: points added, removed and changed, the largest
-    change relative to the coefficient's largest value, and in standard errors.
-
-    Raises
-    ------
-    InputError
-        When the database or a version does not exist.
+    vehicle, coefficient : Which.
+    added, removed, changed : Numbers of tabulated values.
+    largest_relative_change : Over the largest value that the coefficient had.
+    largest_change_in_stderr : In standard errors, the larger of the two versions'.
     """
-    old, new = (_indexed(read_rows(db, v)[0]) for v in (first, second))
+
+    vehicle: str
+    coefficient: str
+    added: int
+    removed: int
+    changed: int
+    largest_relative_change: float
+    largest_change_in_stderr: float
+
+    def to_dict(self) -> dict[str, Any]:
+        """The change for a program to read."""
+        return asdict(self)
+
+
+@dataclass(frozen=True)
+class Difference:
+    """What changed between two versions, one entry a coefficient that differs.
+
+    Attributes
+    ----------
+    first, second : Version numbers.
+    changes : In the order of the coefficients.
+    """
+
+    first: int
+    second: int
+    changes: tuple[Change, ...]
+
+    def __len__(self) -> int:
+        return len(self.changes)
+
+    def __iter__(self) -> Iterator[Change]:
+        return iter(self.changes)
+
+    @property
+    def table(self) -> pd.DataFrame:
+        """The changes as a table, indexed by vehicle and coefficient."""
+        import pandas as pd
+
+        columns = [f.name for f in fields(Change)]
+        return pd.DataFrame(self.to_dict(), columns=columns).set_index(columns[:2])
+
+    def to_dict(self) -> list[dict[str, Any]]:
+        """The changes for a program to read."""
+        return [one.to_dict() for one in self.changes]
+
+    def _repr_html_(self) -> str:
+        rows = [
+            [c.vehicle, c.coefficient, c.added, c.removed, c.changed, share, f"{c.largest_change_in_stderr:.2f}"]
+            for c in self.changes
+            for share in [f"{100 * c.largest_relative_change:.3g} %"]
+        ]
+        header = ("vehicle", "coefficient", "added", "removed", "changed", "largest change", "in standard errors")
+        return html_table(f"version {self.first} to {self.second}", header, rows)
+
+
+def compared(first: pd.DataFrame, second: pd.DataFrame) -> list[Change]:
+    """What changed from database rows to others, one entry a coefficient that differs."""
+    old, new = _indexed(first), _indexed(second)
     both = old.add_suffix("_old").join(new.add_suffix("_new"), how="outer")
     found = []
     for (vehicle, name), group in both.groupby(level=["vehicle", "coefficient"], sort=False):
@@ -48,15 +101,15 @@ def difference(db: str, first: int, second: int) -> list[dict[str, Any]]:
         score = (step / error)[changed & (error > 0)]
         scale = group["value_old"].abs().max()
         found.append(
-            {
-                "vehicle": str(vehicle),
-                "coefficient": str(name),
-                "added": int(added.sum()),
-                "removed": int(removed.sum()),
-                "changed": int(changed.sum()),
-                "largest_relative_change": float(step.max() / scale) if changed.any() and scale > 0 else 0.0,
-                "largest_change_in_stderr": float(score.max()) if not score.empty else 0.0,
-            }
+            Change(
+                vehicle=str(vehicle),
+                coefficient=str(name),
+                added=int(added.sum()),
+                removed=int(removed.sum()),
+                changed=int(changed.sum()),
+                largest_relative_change=float(step.max() / scale) if changed.any() and scale > 0 else 0.0,
+                largest_change_in_stderr=float(score.max()) if not score.empty else 0.0,
+            )
         )
     return found
 

@@ -60,6 +60,32 @@ def conversions(campaign: Campaign) -> dict[str, Any]:
     }
 
 
+def run_sources(campaign: Campaign) -> dict[str, Any]:
+    """File, row and source of every run, as stored with a version.
+
+    Parameters
+    ----------
+    campaign : As read.
+
+    Returns
+    -------
+    JSON content: ``files`` and ``sources``, each text once, and ``runs``, run id -> place in
+    ``files``, row, place in ``sources``.
+    """
+    runs = campaign.runs
+    if runs.empty:
+        return {"files": [], "sources": [], "runs": {}}
+    told = runs["source"].fillna("").astype(str)
+    files, sources = (list(dict.fromkeys(column)) for column in (runs["file"].astype(str), told))
+    file_at, source_at = ({text: i for i, text in enumerate(texts)} for texts in (files, sources))
+    every = zip(runs["run_id"], runs["file"].astype(str), runs["row"], told, strict=True)
+    return {
+        "files": files,
+        "sources": sources,
+        "runs": {str(i): [file_at[f], int(r), source_at[s]] for i, f, r, s in every},
+    }
+
+
 def steps(stored: dict[str, Any]) -> list[tuple[str, str]]:
     """What ``conversions`` stored, in words.
 

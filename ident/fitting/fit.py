@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,10 +14,11 @@ from ident.checks.check import check_campaign, refuse_errors
 from ident.checks.check import table as findings_table
 from ident.checks.findings import Finding
 from ident.database.lock import WAIT
-from ident.database.provenance import conversions
+from ident.database.provenance import conversions, run_sources
 from ident.database.store import commit, database_rows, digest
 from ident.fitting.notes import group_unused, group_warnings
 from ident.identification.identify import Identification, identify
+from ident.output import Results, html_table
 from sim.files.errors import InputError
 
 if TYPE_CHECKING:
@@ -28,28 +30,44 @@ _UNUSED = ("run_id", "file", "row", "output", "reason")
 
 @dataclass(frozen=True)
 class Fit:
-    """One fitted campaign.
+    """One fitted campaign, committed.
 
     Attributes
     ----------
-    campaign, found : What was read and identified.
-    rows : The database rows.
-    version : Version that holds them.
+    campaign, identification : What was read and identified.
+    rows : The database rows, one a tabulated value; columns as in ``DatabaseVersion.rows``.
+    version : Number of the version that holds them.
     new : False when the latest version held them already.
-    digest : Content digest.
+    digest : SHA-256 of the content of the rows.
     findings : Of the quality checks, errors first.
+
+    Examples
+    --------
+    >>> import ident
+    >>> (done,) = ident.fit("my-boat/captive", db="coeff_db")
+    >>> done.version, done.new
+    (0, False)
+    >>> done.coefficients.loc["N_v", ["points", "runs"]].tolist()
+    [1, 16]
     """
 
     campaign: Campaign
-    found: Identification
+    identification: Identification
     rows: pd.DataFrame
     version: int
     new: bool
     digest: str
     findings: list[Finding]
 
-    def summary(self) -> dict[str, Any]:
-        """What a machine wants to know of the fit."""
+    @property
+    def coefficients(self) -> pd.DataFrame:
+        """One row a coefficient: points, measured, runs, median relative error, worst residual, quality."""
+        import pandas as pd
+
+        return pd.DataFrame(coefficient_table(self.rows)).set_index("coefficient")
+
+    def to_dict(self) -> dict[str, Any]:
+        """The fit for a program to read."""
         return {
             "campaign": self.campaign.header.name,
             "vehicle": self.campaign.vehicle.name,
@@ -59,10 +77,16 @@ class Fit:
             "runs": len(self.campaign.runs),
             "conversions": conversions(self.campaign),
             "coefficients": coefficient_table(self.rows),
-            "unused": [dict(zip(_UNUSED, u, strict=True)) for u in self.found.unused],
-            "warnings": [{"subject": s, "message": m} for s, m in self.found.warnings],
+            "unused": [dict(zip(_UNUSED, u, strict=True)) for u in self.identification.unused],
+            "warnings": [{"subject": s, "message": m} for s, m in self.identification.warnings],
             "checks": [f.as_json() for f in self.findings],
         }
+
+    def _repr_html_(self) -> str:
+        title = f"{self.campaign.header.name}: version {self.version}, digest {self.digest[:16]}"
+        table = self.coefficients
+        rows = [(name, *row[:3], f"{100 * row[3]:.1f} %", f"{row[4]:.1f}") for name, *row in table.itertuples()]
+        return html_table(title, ("coefficient", *table.columns[:5]), rows)
 
 
 def metadata(campaign: Campaign, found: Identification, message: str, findings: list[Finding]) -> dict[str, str]:
@@ -75,6 +99,7 @@ def metadata(campaign: Campaign, found: Identification, message: str, findings: 
         "frame": f"x {header.frame.x}, y {header.frame.y}, z {header.frame.z}",
         "inputs": json.dumps(campaign.digests),
         "conversions": json.dumps(conversions(campaign)),
+        "runs": json.dumps(run_sources(campaign)),
         "options": json.dumps({"uncertainty": header.uncertainty.model_dump()}),
         "unused": json.dumps(found.unused),
         "warnings": json.dumps(found.warnings),
@@ -84,27 +109,56 @@ def metadata(campaign: Campaign, found: Identification, message: str, findings: 
     }
 
 
-def fit(folder: Path, db: str, message: str = "", strict: bool = False, wait: float = WAIT) -> list[Fit]:
-    """Fit every campaign at or below ``folder`` into the database.
+def fit(
+    folder: str | os.PathLike[str],
+    db: str | os.PathLike[str] = "coeff_db",
+    message: str = "",
+    strict: bool = False,
+    wait: float = WAIT,
+) -> Results[Fit]:
+    """Identify the coefficients of every campaign at or below a folder; commit one version each.
+
+    Runs are turned to the program frame (x forward, y starboard, z down), made dimensionless and
+    decoupled in order, with the errors of what was subtracted. Either every campaign can be read
+    and identified, or nothing is committed.
 
     Parameters
     ----------
     folder : Campaign folder, or a folder of campaign folders.
-    db : Database path or URL.
+    db : Folder or object-store URL of the database; made when there is none.
     message : Stored with the version.
     strict : Refuse a campaign with a quality finding of severity ``error``.
     wait : How long to wait for other writers of the database [s].
 
     Returns
     -------
-    One Fit a campaign, in folder order.
+    Results of Fit
+        One a campaign, in folder order.
 
     Raises
     ------
-    sim.files.errors.InputError
+    InputError
         For bad input in any campaign, before anything is committed.
+
+    References
+    ----------
+    .. [1] Gertler, M., Hagen, G. R., "Standard equations of motion for submarine simulation",
+       NSRDC Report 2510, 1967.
+    .. [2] Feldman, J., "DTNSRDC revised standard submarine equations of motion",
+       DTNSRDC/SPD-0393-09, 1979.
+    .. [3] Kim, Y., "Development and Validation of Hydrodynamic Model for Near Free Surface
+       Maneuvers of BB2 Joubert Generic Submarine", PhD thesis, University of Iowa, 2021,
+       doi 10.17077/etd.005772, Eqs. (17)-(31).
+
+    Examples
+    --------
+    >>> import ident
+    >>> for done in ident.fit("my-boat/captive", db="coeff_db"):
+    ...     print(done.campaign.vehicle.name, done.version, len(done.rows))
+    my-boat 0 48
     """
-    paths = find_campaigns(folder)
+    path_of_db = os.fspath(db)
+    paths = find_campaigns(Path(folder))
     read = [read_campaign(path) for path in paths]
     names = [campaign.vehicle.name for campaign in read]
     for path, name in zip(paths, names, strict=True):
@@ -117,11 +171,11 @@ def fit(folder: Path, db: str, message: str = "", strict: bool = False, wait: fl
         for path, findings in zip(paths, checked, strict=True):
             refuse_errors(path, findings)
     ready = [(campaign, found, database_rows(found)) for campaign, found in zip(read, identified, strict=True)]
-    done = []
+    done: list[Fit] = []
     for (campaign, found, rows), findings in zip(ready, checked, strict=True):
-        version, new = commit(db, rows, metadata(campaign, found, message, findings), wait)
+        version, new = commit(path_of_db, rows, metadata(campaign, found, message, findings), wait)
         done.append(Fit(campaign, found, rows, version, new, digest(rows), findings))
-    return done
+    return Results(done)
 
 
 def coefficient_table(rows: pd.DataFrame) -> list[dict[str, Any]]:
@@ -185,12 +239,12 @@ def show(done: Fit, console: Console) -> None:
             ", ".join(words),
         )
     console.print(table)
-    for warning in group_warnings(done.found.warnings):
+    for warning in group_warnings(done.identification.warnings):
         console.print(f"[yellow]warning[/] ({warning.count}x) {escape(warning.shown)}", highlight=False)
-    used = {r for n in done.found.nodes for r in n.runs}
+    used = {r for n in done.identification.nodes for r in n.runs}
     total = done.campaign.runs["run_id"]
     console.print(f"{len(used)} of {len(total)} runs used; loads left out, with the reason:")
-    for left in group_unused(done.found.unused):
+    for left in group_unused(done.identification.unused):
         outputs = " ".join(dict.fromkeys(o for found in left.runs.values() for o in found))
         ids = list(left.runs)
         shown = ", ".join(ids[:4]) + (f", ... {len(ids)} runs" if len(ids) > 4 else "")

@@ -1,8 +1,11 @@
-"""A plan as a test matrix a laboratory can run, as JSON and as a table on the screen."""
+"""A plan as a test matrix a laboratory can run, and as a table on the screen."""
 
 from __future__ import annotations
 
 import math
+import os
+from collections.abc import Iterable
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,20 +14,134 @@ import pandas as pd
 
 from ident.captive.campaign import Campaign, to_full_scale, turn
 from ident.captive.run_table import STATES
-from ident.output import whole
-from ident.planning.plan import Plan
+from ident.output import html_table, whole
+from sim.boat.parts import Point
 
 if TYPE_CHECKING:
     from rich.console import Console
 
+Place = tuple[str, str, Point]
 _ANGLES = ("alpha", "beta", "plane")
 _UNITS = {"U": "mps", "D0": "m", "p": "radps", "q": "radps", "r": "radps", "n": "rps", "J": ""}
 
 
-def matrix(plan: Plan, campaign: Campaign) -> pd.DataFrame:
-    """The test matrix in the campaign's frame and scale, units in the header."""
+@dataclass(frozen=True)
+class Need:
+    """One tabulated value that is wanted.
+
+    Attributes
+    ----------
+    name, part, point : Coefficient and where in its table.
+    why : ``no run``, ``standard error``, or the range that is left.
+    size : What its standard error is relative to: root mean square of the term's values, or
+        the median of its kind where the term has none.
+    now, planned : Relative standard error before and after; NaN without a value.
+    tests : Tests that identify it.
+    """
+
+    name: str
+    part: str
+    point: Point
+    why: str
+    size: float
+    tests: tuple[str, ...]
+    now: float = math.nan
+    planned: float = math.nan
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A test matrix and what it is for.
+
+    Attributes
+    ----------
+    campaign : What was measured so far.
+    target : Relative standard error asked for.
+    needs : Every wanted value.
+    runs : One row a run in the program frame, SI and radians, with repeats and what it identifies.
+    untestable : Wanted terms that no test of the facility reaches, with the tests that would.
+
+    Examples
+    --------
+    >>> import ident
+    >>> plan = ident.plan("my-boat/captive", target_rel=0.2)
+    >>> list(plan.matrix.columns[:3])
+    ['run_id', 'test', 'part']
+    """
+
+    campaign: Campaign
+    target: float
+    needs: tuple[Need, ...]
+    runs: pd.DataFrame
+    untestable: dict[str, tuple[str, ...]] = field(default_factory=dict)
+
+    @property
+    def terms(self) -> pd.DataFrame:
+        """One row a term and reason: values wanted, worst relative error now and planned."""
+        return pd.DataFrame(self.summary())
+
+    @property
+    def matrix(self) -> pd.DataFrame:
+        """The test matrix in the campaign's own frame and scale, units in the header."""
+        return matrix(self.runs, self.campaign)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Terms, runs and what is out of reach, for a program to read."""
+        runs = [{k: v for k, v in row.items() if v == v} for row in self.matrix.to_dict("records")]
+        return {
+            "campaign": self.campaign.header.name,
+            "target": self.target,
+            "terms": self.summary(),
+            "runs": runs,
+            "no_test_planned": {name: list(tests) for name, tests in self.untestable.items()},
+        }
+
+    def to_csv(self, path: str | os.PathLike[str]) -> None:
+        """Write the test matrix as CSV.
+
+        Raises
+        ------
+        InputError
+            When the file cannot be written.
+        """
+        with whole(Path(path)) as part:
+            self.matrix.to_csv(part, index=False)
+
+    def _repr_html_(self) -> str:
+        title = f"{self.campaign.header.name}: {len(self.runs)} states for a relative error of {self.target:g}"
+        table = self.matrix
+        return html_table(title, table.columns, table.itertuples(index=False))
+
+    def summary(self) -> list[dict[str, Any]]:
+        """One row a term and reason: values wanted, worst error now and planned."""
+        groups: dict[tuple[str, str, str], list[Need]] = {}
+        for need in self.needs:
+            groups.setdefault((need.name, need.part, need.why), []).append(need)
+        return [
+            {
+                "coefficient": name,
+                "part": part,
+                "why": why,
+                "values": len(own),
+                "tests": list(own[0].tests),
+                "size": own[0].size,
+                "now": _worst(n.now for n in own),
+                "planned": _worst(n.planned for n in own),
+                "reached": all(n.planned <= self.target * (1.0 + 1e-6) for n in own),
+            }
+            for (name, part, why), own in groups.items()
+        ]
+
+
+def _worst(values: Iterable[float]) -> float | None:
+    known = [v for v in values if math.isfinite(v)]
+    return max(known) if known else None
+
+
+def matrix(runs: pd.DataFrame, campaign: Campaign) -> pd.DataFrame:
+    """The runs of a plan in the campaign's frame and scale, units in the header."""
     frame = campaign.header.frame.frame
-    table = to_full_scale(turn(plan.runs, frame, campaign.header.frame.angles), 1.0 / campaign.header.scale.ratio)
+    table = to_full_scale(turn(runs, frame, campaign.header.frame.angles), 1.0 / campaign.header.scale.ratio)
     out = pd.DataFrame(
         {"run_id": [f"P{i + 1:03d}" for i in range(len(table))], "test": table["test"], "part": table["part"]}
     )
@@ -37,37 +154,12 @@ def matrix(plan: Plan, campaign: Campaign) -> pd.DataFrame:
     return out.assign(repeats=table["repeats"], identifies=table["identifies"])
 
 
-def summary(plan: Plan, campaign: Campaign) -> dict[str, Any]:
-    """Terms, runs and what is out of reach, for a program to read."""
-    table = matrix(plan, campaign)
-    runs = [{k: v for k, v in row.items() if v == v} for row in table.to_dict("records")]
-    return {
-        "campaign": campaign.header.name,
-        "target": plan.target,
-        "terms": plan.summary(),
-        "runs": runs,
-        "no_test_planned": {name: list(tests) for name, tests in plan.untestable.items()},
-    }
-
-
-def write_matrix(plan: Plan, campaign: Campaign, path: Path) -> None:
-    """Write the test matrix as CSV.
-
-    Raises
-    ------
-    InputError
-        When the file cannot be written.
-    """
-    with whole(path) as part:
-        matrix(plan, campaign).to_csv(part, index=False)
-
-
-def show(plan: Plan, campaign: Campaign, console: Console) -> None:
+def show(plan: Plan, console: Console) -> None:
     """Print what is wanted, what the plan reaches, and the number of runs by test."""
     from rich.markup import escape
     from rich.table import Table
 
-    title = f"{campaign.vehicle.title}: values wanted at a relative standard error of {plan.target:g}"
+    title = f"{plan.campaign.vehicle.title}: values wanted at a relative standard error of {plan.target:g}"
     table = Table(title=escape(title), title_justify="left")
     for name in ("coefficient", "part", "why", "values", "now", "planned", "tests"):
         table.add_column(name, justify="right" if name in ("values", "now", "planned") else "left")

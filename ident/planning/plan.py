@@ -10,92 +10,26 @@ shown are its, errors of everything that is subtracted included.
 from __future__ import annotations
 
 import math
+import os
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from ident.captive.campaign import Campaign
+from ident.captive.campaign import Campaign, find_campaigns, read_campaign
 from ident.captive.run_table import STATES, run_table
 from ident.checks.findings import Body, dynamic
 from ident.identification.identify import Identification, identify
 from ident.identification.nodes import vanishes
 from ident.identification.solver import Solver
-from ident.planning.candidates import Facility, candidate_runs, defaults
+from ident.planning.candidates import Facility, candidate_runs, defaults, read_facility
 from ident.planning.design import Array, fewest_runs
+from ident.planning.matrix import Need, Place, Plan
 from sim.boat.catalogue import OUTPUTS, Term
-from sim.boat.parts import Point, parts_of, vehicle_terms
+from sim.boat.parts import parts_of, vehicle_terms
 from sim.files.errors import InputError
-
-Place = tuple[str, str, Point]
-
-
-@dataclass
-class Need:
-    """One tabulated value that is wanted.
-
-    Attributes
-    ----------
-    name, part, point : Coefficient and where in its table.
-    why : ``no run``, ``standard error``, or the range that is left.
-    size : What its standard error is relative to: root mean square of the term's values, or
-        the median of its kind where the term has none.
-    now, planned : Relative standard error before and after; NaN without a value.
-    tests : Tests that identify it.
-    """
-
-    name: str
-    part: str
-    point: Point
-    why: str
-    size: float
-    tests: tuple[str, ...]
-    now: float = math.nan
-    planned: float = math.nan
-
-
-@dataclass
-class Plan:
-    """A test matrix and what it is for.
-
-    Attributes
-    ----------
-    target : Relative standard error asked for.
-    needs : Every wanted value.
-    runs : One row a run in the program frame, with repeats and what it identifies.
-    untestable : Wanted terms that no test of the facility reaches, with the tests that would.
-    """
-
-    target: float
-    needs: list[Need]
-    runs: pd.DataFrame
-    untestable: dict[str, tuple[str, ...]] = field(default_factory=dict)
-
-    def summary(self) -> list[dict[str, Any]]:
-        """One row a term and reason: values wanted, worst error now and planned."""
-        groups: dict[tuple[str, str, str], list[Need]] = {}
-        for need in self.needs:
-            groups.setdefault((need.name, need.part, need.why), []).append(need)
-        return [
-            {
-                "coefficient": name,
-                "part": part,
-                "why": why,
-                "values": len(own),
-                "tests": list(own[0].tests),
-                "size": own[0].size,
-                "now": _worst(n.now for n in own),
-                "planned": _worst(n.planned for n in own),
-                "reached": all(n.planned <= self.target * (1.0 + 1e-6) for n in own),
-            }
-            for (name, part, why), own in groups.items()
-        ]
-
-
-def _worst(values: Any) -> float | None:
-    known = [v for v in values if math.isfinite(v)]
-    return max(known) if known else None
 
 
 @dataclass
@@ -258,6 +192,45 @@ class _Noise:
         return max(floor, relative * expected)
 
 
+def plan(
+    folder: str | os.PathLike[str],
+    target_rel: float = 0.1,
+    facility: str | os.PathLike[str] | Facility | None = None,
+) -> Plan:
+    """The fewest further runs that give every term of a campaign's vehicle a wanted standard error.
+
+    Parameters
+    ----------
+    folder : Campaign folder.
+    target_rel : Wanted standard error, relative to the size of a term's values.
+    facility : TOML file of levels and limits, or what was read from one; the campaign's own
+        ranges when None.
+
+    Returns
+    -------
+    Plan
+
+    Raises
+    ------
+    InputError
+        For more than one campaign, a campaign or facility that cannot be read, or a target that
+        is not positive.
+
+    Examples
+    --------
+    >>> import ident
+    >>> plan = ident.plan("my-boat/captive", target_rel=0.2)
+    >>> sorted(set(plan.terms["why"]) - {"standard error"})[:1]
+    ['no run']
+    """
+    paths = find_campaigns(Path(folder))
+    if len(paths) > 1:
+        text = f"one campaign folder, such as {paths[0]}"
+        raise InputError(str(folder), f"{len(paths)} campaigns", text)
+    limits = facility if isinstance(facility, Facility) or facility is None else read_facility(Path(facility))
+    return make_plan(read_campaign(paths[0]), target_rel, limits)
+
+
 def make_plan(campaign: Campaign, target: float, facility: Facility | None = None) -> Plan:
     """The fewest runs of a facility that bring every term to a relative standard error.
 
@@ -294,9 +267,7 @@ def make_plan(campaign: Campaign, target: float, facility: Facility | None = Non
     for output in OUTPUTS:
         # A load without an unknown has no bearing; its error must only not be zero.
         runs[f"s_{output}"] = [blocks[i].sigma.get(output, 1.0) / math.sqrt(n) for i, n in chosen]
-    plan = Plan(target, list(problem.needs.values()), runs, _untestable(problem))
-    _predict(problem, plan)
-    return plan
+    return Plan(campaign, target, _predict(problem, runs), runs, _untestable(problem))
 
 
 def _design(problem: _Problem, blocks: list[list[dict[int, float]]], most: int) -> np.ndarray:
@@ -348,13 +319,17 @@ def planned_campaign(campaign: Campaign, runs: pd.DataFrame) -> Campaign:
     return replace(campaign, runs=pd.concat([campaign.runs, done], ignore_index=True))
 
 
-def _predict(problem: _Problem, plan: Plan) -> None:
-    """Standard errors that ``identify`` gives with the planned runs done."""
-    if plan.runs.empty:
-        return
-    after = identify(planned_campaign(problem.campaign, plan.runs))
+def _predict(problem: _Problem, runs: pd.DataFrame) -> tuple[Need, ...]:
+    """What is wanted, with the standard errors that ``identify`` gives with the planned runs done."""
+    if runs.empty:
+        return tuple(problem.needs.values())
+    after = identify(planned_campaign(problem.campaign, runs))
     index = {(n.name, n.part, n.point): i for i, n in enumerate(after.nodes)}
-    for place, need in problem.needs.items():
-        if place in index:
-            i = index[place]
-            need.planned = math.sqrt(after.covariance[i, i]) / need.size
+
+    def planned(place: Place, need: Need) -> Need:
+        if place not in index:
+            return need
+        i = index[place]
+        return replace(need, planned=math.sqrt(after.covariance[i, i]) / need.size)
+
+    return tuple(planned(place, need) for place, need in problem.needs.items())

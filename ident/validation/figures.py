@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ident.output import whole
 from ident.validation.bands import Bands
-from ident.validation.validate import Validation
+from ident.validation.result import Validation
 from sim.boat.database import version_words
 from sim.flight.simulate import CHANNELS, Simulation
 
@@ -97,7 +97,7 @@ def _flights(done: Validation) -> list[tuple[Simulation, dict[str, Any]]]:
     main = {"color": "tab:red", "lw": 1.6, "label": "simulated from the database"}
     own = [
         (flight, {"color": "tab:orange", "lw": 1.2, "ls": "-.", "label": f"simulated as {source} starts"})
-        for source, flight in done.own.items()
+        for source, flight in done.as_started.items()
     ]
     return [(done.simulation, main), *own]
 
@@ -172,7 +172,7 @@ def _track(done: Validation, axis: Any) -> None:
 
 def _spiral(done: Validation, axis: Any) -> None:
     """Steady yaw rate against rudder, in the order flown."""
-    curve = done.result.get("curve", [])
+    curve = done.curve or []
     rudder, rate = [p["dH_deg"] for p in curve], [p["r_degps"] for p in curve]
     axis.plot(rudder, rate, color="tab:red", marker="o", ms=4, lw=1.2, label="simulated from the database")
     axis.axhline(0.0, color="k", lw=0.6)
@@ -188,7 +188,7 @@ def _grid(done: Validation, axes: Any) -> None:
         "ballast_kg": "ballast [kg]",
         "pitch_deg": "pitch [deg]",
     }
-    grid = done.result["grid"]
+    grid = done.grid
     for axis, (key, label) in zip(axes, names.items(), strict=True):
         for depth in sorted({p["depth_m"] for p in grid}):
             points = [p for p in grid if p["depth_m"] == depth and p[key] is not None]
@@ -201,7 +201,7 @@ def _grid(done: Validation, axes: Any) -> None:
 def _draw(done: Validation, plt: Any, bands: Bands | None) -> tuple[Any, Any]:
     """The figure, and the axis that has every label."""
     kind = done.case.maneuver or ""
-    if done.result.get("grid"):
+    if done.grid:
         figure, axes = plt.subplots(2, 2, figsize=(11, 7), layout="constrained")
         _grid(done, np.ravel(axes))
         return figure, np.ravel(axes)[0]
@@ -258,4 +258,4 @@ def case_figure(done: Validation, path: Path, bands: Bands | None = None) -> Pat
     figure, labelled = _draw(done, pyplot(), bands)
     handles, labels = labelled.get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=4, frameon=False)
-    return finish(figure, path, f"{done.case.title}, {done.case.vehicle}", version_words(done.result["database"]))
+    return finish(figure, path, f"{done.case.title}, {done.case.vehicle}", version_words(done.database))

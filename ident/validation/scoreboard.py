@@ -11,7 +11,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ident.validation.boats import Boat, Fleet
-from ident.validation.validate import Validation, errors, flights, validate
+from ident.validation.result import ChannelError, Validation
+from ident.validation.validate import errors, flights, validate
 from sim.boat.catalogue import CatalogueError
 from sim.boat.database import version_words
 from sim.boat.vehicle import Vehicle, bundled, load_vehicle
@@ -96,17 +97,18 @@ def worst(cases: list[dict[str, Any]]) -> dict[str, Any] | None:
 
 def _with_parent(done: Validation, fleet: Fleet) -> dict[str, Any]:
     """The result with the error of the parent version beside each error of this one."""
-    result = done.result
+    result = done.to_dict()
     parent = fleet.parent(done.boat.vehicle)
-    flown: dict[str, Any] = {}
-    if parent is not None and result["references"]:
+    flown: dict[str, dict[str, ChannelError]] = {}
+    if parent is not None and done.errors:
         try:
             flown = errors(done.case, done.reference, *flights(done.case, parent))
         except (NoEquilibrium, InputError, CatalogueError):
             # The parent does not come to where the reference is: it has no error there.
             flown = {}
     for _, source, channel, entry in entries([result]):
-        error = flown.get(source, {}).get(channel, {}).get("rmse")
+        against = flown.get(source, {}).get(channel)
+        error = against.rmse if against else None
         entry["parent_rmse"] = error
         entry["ratio_to_parent"] = entry["rmse"] / error if error else None
     described = {"version": parent.commit.number, "digest": parent.commit.digest} if parent else None

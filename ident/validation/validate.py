@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ident.metrics.in_waves import InWaves
 from ident.metrics.measure import measured
 from ident.validation.boats import Boat, Fleet
 from ident.validation.coverage import outside_tables
+from ident.validation.result import ChannelError, Validation
 from ident.validation.sweep import with_grid
 from sim.boat.database import axis_columns, version_words
 from sim.boat.vehicle import load_vehicle
@@ -29,30 +29,6 @@ _FRAMES = {
     "source": FrameData(x="aft", y="starboard", z="up"),
     "program": FrameData(x="forward", y="starboard", z="down"),
 }
-
-
-@dataclass(frozen=True)
-class Validation:
-    """One flown case with its comparison.
-
-    Attributes
-    ----------
-    case, simulation, reference : What was flown and what it is held against.
-    result : The JSON object of the comparison.
-    constant_axes : Term -> axes along which it was measured at one value only.
-    boat : The vehicle with its coefficients.
-    own : Flights from the start of a source's record, by source.
-    in_waves : Harmonics or statistics of a flight in waves.
-    """
-
-    case: Case
-    simulation: Simulation
-    reference: Series
-    result: dict[str, Any]
-    constant_axes: dict[str, list[str]]
-    boat: Boat
-    own: dict[str, Simulation]
-    in_waves: InWaves
 
 
 def rmse(simulation: Simulation, channel: str, series: tuple[Array, Array, str], abscissa: str = "t") -> float:
@@ -98,7 +74,7 @@ def _published(published: dict[str, tuple[Array, Array, str]], channel: str, uni
 
 def _error(
     simulation: Simulation, reference: Series, source: str, channel: str, published: dict[str, tuple[Array, Array, str]]
-) -> dict[str, Any]:
+) -> ChannelError:
     """Comparison of one channel with one source, as far as both go.
 
     Raises
@@ -111,25 +87,23 @@ def _error(
     if not flown.any():
         end = f"the run ends at {simulation[reference.abscissa][-1]:.4g}"
         raise InputError(f"reference {source} {channel}", f"begins at {reference.abscissa} = {along[0]:.4g}", end)
-    entry: dict[str, Any] = {
-        "rmse": rmse(simulation, channel, (along[flown], value[flown], unit), reference.abscissa),
-        "unit": unit,
-        "n": int(flown.sum()),
-        "published_model_rmse": None,
-        "ratio": None,
-        "reference_sigma": None,
-    }
+    found = rmse(simulation, channel, (along[flown], value[flown], unit), reference.abscissa)
     sigma = reference.sigma.get(source, {}).get(channel)
-    if sigma is not None:
-        entry["reference_sigma"] = float(np.sqrt(np.mean(sigma[flown] ** 2)))
-    if channel in published:
-        other_along, other = _published(published, channel, unit)
-        both = flown & (along >= other_along[0]) & (along <= other_along[-1])
-        if both.any():
-            gap = np.interp(along[both], other_along, other) - value[both]
-            entry["published_model_rmse"] = float(np.sqrt(np.mean(gap**2)))
-            entry["ratio"] = entry["rmse"] / entry["published_model_rmse"] if entry["published_model_rmse"] else None
-    return entry
+    scatter = None if sigma is None else float(np.sqrt(np.mean(sigma[flown] ** 2)))
+    other = _published_rmse(along, value, flown, _published(published, channel, unit)) if channel in published else None
+    return ChannelError(found, unit, int(flown.sum()), other, found / other if other else None, scatter)
+
+
+def _published_rmse(
+    along: Array, value: Array, flown: NDArray[np.bool_], published: tuple[Array, Array]
+) -> float | None:
+    """Root mean square difference of the published model where it and the reference go; None where they do not."""
+    other_along, other = published
+    both = flown & (along >= other_along[0]) & (along <= other_along[-1])
+    if not both.any():
+        return None
+    gap = np.interp(along[both], other_along, other) - value[both]
+    return float(np.sqrt(np.mean(gap**2)))
 
 
 def flights(case: Case, boat: Boat) -> tuple[Simulation, dict[str, Simulation]]:
@@ -146,7 +120,9 @@ def flights(case: Case, boat: Boat) -> tuple[Simulation, dict[str, Simulation]]:
     return fly(case, boat.vehicle, model, water), own
 
 
-def errors(case: Case, reference: Series, simulation: Simulation, own: dict[str, Simulation]) -> dict[str, Any]:
+def errors(
+    case: Case, reference: Series, simulation: Simulation, own: dict[str, Simulation]
+) -> dict[str, dict[str, ChannelError]]:
     """Errors by source and channel.
 
     Parameters
@@ -159,7 +135,7 @@ def errors(case: Case, reference: Series, simulation: Simulation, own: dict[str,
     InputError
         When the reference begins after the run ends.
     """
-    found: dict[str, Any] = {}
+    found: dict[str, dict[str, ChannelError]] = {}
     if case.reference is None:
         return found
     published = reference[case.reference.published_model or ""]
@@ -173,16 +149,16 @@ def errors(case: Case, reference: Series, simulation: Simulation, own: dict[str,
     return found
 
 
-def _passed(case: Case, found: dict[str, Any]) -> bool:
+def _passed(case: Case, found: dict[str, dict[str, ChannelError]]) -> bool:
     for tolerance in case.tolerance:
         entry = found.get(tolerance.source, {}).get(tolerance.channel)
-        if entry is None or entry["unit"] != tolerance.unit:
+        if entry is None or entry.unit != tolerance.unit:
             raise InputError(
                 f"case {case.name}, tolerance on {tolerance.source} {tolerance.channel} [{tolerance.unit}]",
                 "no such reference channel in that unit",
                 "a source, channel and unit of the reference file",
             )
-        if not entry["rmse"] <= tolerance.rmse:
+        if not entry.rmse <= tolerance.rmse:
             return False
     return True
 
@@ -225,67 +201,83 @@ def _with_reference(case: Case, path: Path, frame: str | None) -> tuple[Case, Se
 
 
 def validate(
-    name: str,
-    db: str,
+    case: str | os.PathLike[str],
+    db: str | os.PathLike[str] = "coeff_db",
     version: int | None = None,
-    vehicle_name: str | None = None,
-    reference_file: Path | None = None,
-    reference_frame: str | None = None,
+    *,
+    vehicle: str | os.PathLike[str] | None = None,
+    reference: str | os.PathLike[str] | None = None,
+    frame: str | None = None,
     fleet: Fleet | None = None,
 ) -> Validation:
-    """Fly a case from a database version and compare.
+    """Fly a case from a database version and hold it against its references.
 
     Parameters
     ----------
-    name : Bundled case or path to a case file.
-    db : Database path or URL.
-    version : Database version, latest when None.
-    vehicle_name : Bundled vehicle or path to a vehicle file, instead of the case's.
-    reference_file, reference_frame : A user's own reference instead of the case's, and its
-        frame, ``source`` or ``program``; the case's when None.
+    case : Bundled case or path to a case file.
+    db, version : Folder or URL of the database, and version, latest when None.
+    vehicle : Bundled vehicle or path to a vehicle file, instead of the case's.
+    reference : CSV file of your own series instead of the case's: source, channel, t or s,
+        value, unit, and sigma where it is known.
+    frame : Frame of ``reference``: ``source`` (x aft, z up) or ``program`` (x forward, z down);
+        the case's when None.
     fleet : The database version, where more than one case is flown from it.
+
+    Returns
+    -------
+    Validation
 
     Raises
     ------
     InputError
         For a case, vehicle, reference, database or version that does not exist or fit.
-    sim.flight.trim.NoEquilibrium
+    NoEquilibrium
         When the case starts from self-propulsion and there is none.
+
+    Examples
+    --------
+    >>> import ident
+    >>> done = ident.validate("my-boat/zigzag.toml", db="coeff_db", version=0)
+    >>> sorted(done.errors["TRIAL"])
+    ['psi', 'r', 'u']
     """
-    case, where = load_case(name)
-    if reference_file is not None:
-        case, reference = _with_reference(case, reference_file, reference_frame)
+    flown, where = load_case(os.fspath(case))
+    if reference is not None:
+        flown, series = _with_reference(flown, Path(reference), frame)
     else:
-        reference = load_reference(case, where)
-    check_reference(case, reference, where)
-    vehicle = load_vehicle(vehicle_name) if vehicle_name else load_vehicle(case.vehicle, beside=where)
-    case = case.model_copy(update={"vehicle": vehicle.name})
-    boat = (fleet or Fleet(db, version)).boat(vehicle)
-    simulation, own = flights(case, boat)
-    for one in (simulation, *own.values()):
+        series = load_reference(flown, where)
+    check_reference(flown, series, where)
+    ship = load_vehicle(os.fspath(vehicle)) if vehicle else load_vehicle(flown.vehicle, beside=where)
+    flown = flown.model_copy(update={"vehicle": ship.name})
+    boat = (fleet or Fleet(os.fspath(db), version)).boat(ship)
+    simulation, as_started = flights(flown, boat)
+    for one in (simulation, *as_started.values()):
         if len(one["t"]) < 2:
             found_at = f"the run ends at {one.end[0]:.3f} s, before a second record"
             raise InputError(f"{where}, key run", found_at, "a run of two records or more; events that happen later")
-    found = errors(case, reference, simulation, own)
-    found_on = measured(case, simulation, reference, own)
-    metrics, curve = found_on.metrics, found_on.curve
-    model = boat.model(case)
-    grid = with_grid(case, vehicle, model, metrics)
+    found = errors(flown, series, simulation, as_started)
+    found_on = measured(flown, simulation, series, as_started)
+    model = boat.model(flown)
+    # Adds its revolutions to the metrics.
+    grid = with_grid(flown, ship, model, found_on.metrics)
     outside, constant = outside_tables(simulation, boat.coefficients, model)
-    result = {
-        "case": case.name,
-        "vehicle": vehicle.name,
-        "database": {"path": db, "version": boat.commit.number, "digest": boat.commit.digest},
-        "references": found,
-        "metrics": metrics,
-        "outside_tables": outside,
-        **({"curve": curve} if curve else {}),
-        **grid,
-        "trim_limited": list(simulation.trim.limited) if simulation.trim else [],
-        "ends_s": float(simulation.end[0]),
-        "passed": bool(_complete(simulation) and _passed(case, found) and _published_met(case, metrics)),
-    }
-    return Validation(case, simulation, reference, result, constant, boat, own, found_on.in_waves)
+    met = _passed(flown, found) and _published_met(flown, found_on.metrics)
+    return Validation(
+        case=flown,
+        simulation=simulation,
+        reference=series,
+        boat=boat,
+        db=os.fspath(db),
+        errors=found,
+        metrics=found_on.metrics,
+        as_started=as_started,
+        outside_tables=outside,
+        constant_axes=constant,
+        curve=found_on.curve,
+        grid=grid.get("grid"),
+        in_waves=found_on.in_waves,
+        passed=bool(_complete(simulation) and met),
+    )
 
 
 def _complete(simulation: Simulation) -> bool:
@@ -313,37 +305,36 @@ def show(done: Validation, console: Console) -> None:
     from rich.markup import escape
     from rich.table import Table
 
-    result = done.result
-    console.print(f"[bold]{escape(done.case.title)}[/], {version_words(result['database'])}")
-    if result["references"]:
+    console.print(f"[bold]{escape(done.case.title)}[/], {version_words(done.database)}")
+    if done.errors:
         table = Table("reference", "channel", "RMSE", "published model", "ratio", "unit", title="Errors")
-        for source, channels in result["references"].items():
+        for source, channels in done.errors.items():
             for channel, e in channels.items():
-                ratio = e["ratio"]
-                text = "-" if ratio is None else f"[{'green' if ratio <= 1 else 'red'}]{ratio:.2f}[/]"
-                table.add_row(source, channel, _number(e["rmse"]), _number(e["published_model_rmse"]), text, e["unit"])
+                text = "-" if e.ratio is None else f"[{'green' if e.ratio <= 1 else 'red'}]{e.ratio:.2f}[/]"
+                table.add_row(source, channel, _number(e.rmse), _number(e.published_model_rmse), text, e.unit)
         console.print(table)
-    if result["metrics"]:
-        labels = list(next(iter(result["metrics"].values())))
+    if done.metrics:
+        labels = list(next(iter(done.metrics.values())))
         table = Table("metric", *labels, title="Metrics (ITTC)")
-        for metric, values in result["metrics"].items():
+        for metric, values in done.metrics.items():
             table.add_row(metric, *[_number(values[c]) for c in labels])
         console.print(table)
-    _show_grid(result.get("grid", []), console)
+    _show_grid(done.grid or [], console)
     _show_outside(done, console)
-    if result["trim_limited"]:
-        console.print(f"[red]at the start at their limit: {', '.join(result['trim_limited'])}[/]")
+    limited = done.simulation.trim.limited if done.simulation.trim else ()
+    if limited:
+        console.print(f"[red]at the start at their limit: {', '.join(limited)}[/]")
     end = float(done.simulation["t"][-1])
     if not _complete(done.simulation):
         console.print(f"[red]the simulation left the finite numbers after {end:.1f} s; errors are up to there[/]")
     elif end < done.case.run.duration_s - done.case.run.record_s:
-        console.print(f"the run ended at {done.result['ends_s']:.1f} s by an event of the case", highlight=False)
+        console.print(f"the run ended at {done.simulation.end[0]:.1f} s by an event of the case", highlight=False)
     if float(done.simulation["D0"].min()) < 0.0:
         console.print("[red]the sail top left the water; the model holds for a fully submerged boat only[/]")
     if not done.case.tolerance and all(p.tolerance is None for p in done.case.published):
         console.print("the case states no tolerance")
     else:
-        verdict = "[green]within[/]" if result["passed"] else "[red]outside[/]"
+        verdict = "[green]within[/]" if done.passed else "[red]outside[/]"
         console.print(f"{verdict} the tolerances of the case file")
 
 
@@ -365,7 +356,7 @@ def _show_outside(done: Validation, console: Console) -> None:
 
     units = {axis: column for column, axis in axis_columns().items()}
     rows: dict[tuple[str, float], list[str]] = {}
-    for item in done.result["outside_tables"]:
+    for item in done.outside_tables:
         rows.setdefault((item["axis"], round(item["fraction_of_time"], 3)), []).append(item["term"])
     if rows:
         table = Table("axis", "share of time", "terms", title="Used outside their data")

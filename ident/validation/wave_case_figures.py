@@ -9,7 +9,7 @@ import pandas as pd
 
 from ident.metrics import seaway
 from ident.metrics.in_waves import BROACHING
-from ident.validation.validate import Validation
+from ident.validation.result import Validation
 from ident.validation.wave_figures import exceedance_figure, harmonics_figure, seaway_figure, spectrum_figure
 from sim.boat.database import version_words
 
@@ -24,7 +24,7 @@ def sea_figures(done: Validation, folder: Path) -> list[Path]:
     """
     if done.case.maneuver != "irregular_waves" or done.simulation.waves is None:
         return []
-    database = done.result["database"]
+    database = done.database
     stamp = version_words(database)
     title, name = f"{done.case.title}, {done.case.vehicle}", f"{done.case.name}_v{database['version']}"
     found = done.in_waves.statistics
@@ -71,7 +71,7 @@ def _over_depth(done: list[Validation], folder: Path, suffix: str) -> Path:
     ]
     reference = pd.DataFrame(rows, columns=["source", "channel", "D0_m", "value", "sigma"])
     flown = {d.case.initial.depth_m: d.in_waves.harmonics for d in done}
-    database, case = done[0].result["database"], done[0].case
+    database, case = done[0].database, done[0].case
     encounter = next(iter(done[0].in_waves.harmonics.values())).encounter
     wave = f"waves {2.0 * encounter.amplitude:.3g} m high, {2.0 * math.pi / encounter.number:.4g} m long"
     # mu is 180 deg in head seas.

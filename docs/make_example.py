@@ -1,4 +1,4 @@
-"""Write the data of docs/your-own-boat.md: ``python docs/example/make.py``.
+"""Write the data of docs/your-own-boat.md: ``python docs/make_example.py``.
 
 Captive loads come from known coefficients through the term table, with 2 % noise; some runs are
 written as the balance records them, with a start-up transient and correlated noise; the trial
@@ -24,7 +24,7 @@ from sim.boat.vehicle import load_vehicle
 from sim.flight.case import Case, load_case
 from sim.flight.simulate import simulate
 
-HERE = Path(__file__).resolve().parent
+HERE = Path(__file__).resolve().parents[1] / "ident" / "starter" / "files"
 RATIO, TANK, NOISE = 12.0, 1000.0, 0.02
 
 # The truth. Prime form, program frame.

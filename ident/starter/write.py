@@ -1,0 +1,63 @@
+"""`ident new`: write the starter files into a folder."""
+
+from __future__ import annotations
+
+import os
+from importlib.resources import files
+from importlib.resources.abc import Traversable
+from pathlib import Path
+
+from ident.output import check_folder, whole
+from sim.files.errors import InputError
+
+
+def _every(folder: Traversable, place: Path) -> list[tuple[Path, Traversable]]:
+    """Every file at or below a folder of the package, with where it goes."""
+    found: list[tuple[Path, Traversable]] = []
+    for one in sorted(folder.iterdir(), key=lambda entry: entry.name):
+        if one.is_dir():
+            found += _every(one, place / one.name)
+        elif not one.name.startswith((".", "__")):
+            found.append((place / one.name, one))
+    return found
+
+
+def write_starter(folder: str | os.PathLike[str]) -> tuple[Path, ...]:
+    """Write a commented boat, campaign, case, trial and calibration, to be changed into your own.
+
+    The boat is invented; its captive loads are computed from known coefficients with 2 % noise, and
+    its trial is the same boat flown with them.
+
+    Parameters
+    ----------
+    folder : New or empty folder.
+
+    Returns
+    -------
+    tuple of pathlib.Path
+        The files: ``my-boat.toml`` (vehicle), ``captive/campaign.toml`` with its runs,
+        ``zigzag.toml`` (case) with ``zigzag_trial.csv``, ``calibration.toml``.
+
+    Raises
+    ------
+    InputError
+        When the folder is not empty or cannot be written to.
+
+    Examples
+    --------
+    >>> import ident
+    >>> written = ident.write_starter("new-boat")
+    >>> (done,) = ident.fit("new-boat/captive", db="new-boat/db")
+    >>> ident.validate("new-boat/zigzag.toml", db="new-boat/db").passed
+    True
+    """
+    place = Path(folder)
+    check_folder(place)
+    if place.is_dir() and any(place.iterdir()):
+        raise InputError(str(place), "a folder that is not empty", "a new or empty folder: nothing is overwritten")
+    written = []
+    for path, source in _every(files("ident") / "starter" / "files", place):
+        with whole(path) as part:
+            part.write_bytes(source.read_bytes())
+        written.append(path)
+    return tuple(written)

@@ -1,0 +1,208 @@
+"""What a validation gives: a flight, its errors against references, its metrics."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+from ident.output import html_table
+from sim.boat.database import version_words
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    import pandas as pd
+
+    from ident.metrics.in_waves import InWaves
+    from ident.validation.bands import Bands
+    from ident.validation.boats import Boat
+    from sim.flight.case import Case, Series
+    from sim.flight.simulate import Simulation
+
+
+@dataclass(frozen=True)
+class ChannelError:
+    """How far a flight is from one channel of one reference.
+
+    Attributes
+    ----------
+    rmse : Root mean square difference at the reference's own times or path lengths.
+    unit : Of the reference and so of every error here.
+    n : Number of the reference's points, as far as the flight went.
+    published_model_rmse : The same of the published model; None without one.
+    ratio : ``rmse`` over that.
+    reference_sigma : Root mean square of the reference's own standard error; None when not given.
+
+    Examples
+    --------
+    >>> import ident
+    >>> done = ident.validate("my-boat/zigzag.toml", db="coeff_db")
+    >>> error = done.errors["TRIAL"]["psi"]
+    >>> error.unit, error.n, error.rmse < 3.0
+    ('deg', 100, True)
+    """
+
+    rmse: float
+    unit: str
+    n: int
+    published_model_rmse: float | None = None
+    ratio: float | None = None
+    reference_sigma: float | None = None
+
+    def to_dict(self) -> dict[str, Any]:
+        """The error for a program to read."""
+        return asdict(self)
+
+
+@dataclass(frozen=True)
+class Validation:
+    """One flown case, held against its references.
+
+    Attributes
+    ----------
+    case : What was flown, with the name of the vehicle that flew it.
+    simulation : The flight, program frame, SI and radians.
+    reference : What it is held against, in the references' units.
+    boat : The vehicle with its coefficients.
+    db : Path or URL of the database.
+    errors : Source -> channel -> error.
+    metrics : ITTC metric -> ``simulated``, each source and ``published_model`` -> value or None.
+    as_started : Flights from the start of a source's own record, by source.
+    outside_tables : ``term``, ``axis`` and ``fraction_of_time`` of every use beyond the data.
+    constant_axes : Term -> axes along which it was measured at one value only.
+    curve : Points of a spiral; None for other maneuvers.
+    grid : Points of a sweep over speed and depth; None without one.
+    in_waves : Harmonics or statistics of a flight in waves.
+    passed : Whether the run is complete and every tolerance of the case is met.
+    bands : Error bands from sampled coefficients; None when none were flown.
+
+    Examples
+    --------
+    >>> import ident
+    >>> done = ident.validate("my-boat/zigzag.toml", db="coeff_db")
+    >>> done.passed, done.version
+    (True, 0)
+    >>> done.table.loc[("TRIAL", "psi"), "unit"]
+    'deg'
+    >>> round(done.metrics["overshoot_1_deg"]["simulated"])
+    8
+    >>> done.simulation["psi"].shape == done.simulation["t"].shape
+    True
+    """
+
+    case: Case
+    simulation: Simulation
+    reference: Series
+    boat: Boat
+    db: str
+    errors: dict[str, dict[str, ChannelError]]
+    metrics: dict[str, dict[str, float | None]]
+    as_started: dict[str, Simulation]
+    outside_tables: list[dict[str, Any]]
+    constant_axes: dict[str, list[str]]
+    curve: list[dict[str, float]] | None
+    grid: list[dict[str, Any]] | None
+    in_waves: InWaves
+    passed: bool
+    bands: Bands | None = None
+
+    @property
+    def version(self) -> int:
+        """Number of the version that wrote the vehicle's coefficients."""
+        return self.boat.commit.number
+
+    @property
+    def digest(self) -> str:
+        """SHA-256 of the content of the vehicle's rows."""
+        return self.boat.commit.digest
+
+    @property
+    def database(self) -> dict[str, Any]:
+        """Path, version and digest, as every JSON output names them."""
+        return {"path": self.db, "version": self.version, "digest": self.digest}
+
+    @property
+    def table(self) -> pd.DataFrame:
+        """One row a source and channel: the fields of ``ChannelError``."""
+        import pandas as pd
+
+        rows = {(s, c): e.to_dict() for s, channels in self.errors.items() for c, e in channels.items()}
+        columns = list(ChannelError.__dataclass_fields__)
+        index = pd.MultiIndex.from_tuples(list(rows), names=["source", "channel"]) if rows else None
+        return pd.DataFrame(list(rows.values()), index=index, columns=columns)
+
+    def with_bands(
+        self,
+        samples: int,
+        seed: int = 0,
+        each: Callable[[int], None] = lambda done: None,
+        dask: str | None = None,
+    ) -> Validation:
+        """The same with error bands: the case flown with coefficient sets drawn from their errors.
+
+        Parameters
+        ----------
+        samples : Number of coefficient sets, two or more.
+        seed : Of the random generator; sample i depends on it and on i alone.
+        each : Called with the number of samples flown since the last call.
+        dask : Address of a Dask scheduler that flies them instead of this machine.
+
+        Returns
+        -------
+        Validation
+            With ``bands``: ``bands.band(channel, "95")`` gives lower and upper edge over ``bands.time``.
+
+        Raises
+        ------
+        InputError
+            When no sample has a self-propulsion state, or the cluster is not there.
+
+        Examples
+        --------
+        >>> import ident
+        >>> done = ident.validate("my-boat/zigzag.toml", db="coeff_db").with_bands(8)
+        >>> low, high = done.bands.band("psi", "95")
+        >>> bool((low <= high).all())
+        True
+        """
+        from ident.validation.bands import fly_samples
+
+        bands = fly_samples(self.case, self.boat.vehicle, self.boat.rows, samples, seed, each=each, dask=dask)
+        return replace(self, bands=bands)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The comparison for a program to read, as ``ident validate --json`` prints it."""
+        trim = self.simulation.trim
+        found = {
+            "case": self.case.name,
+            "vehicle": self.case.vehicle,
+            "database": self.database,
+            "references": {s: {c: e.to_dict() for c, e in found.items()} for s, found in self.errors.items()},
+            "metrics": self.metrics,
+            "outside_tables": self.outside_tables,
+            **({"curve": self.curve} if self.curve else {}),
+            **({"grid": self.grid} if self.grid is not None else {}),
+            "trim_limited": list(trim.limited) if trim else [],
+            "ends_s": float(self.simulation.end[0]),
+            "passed": self.passed,
+        }
+        if self.bands is not None:
+            from ident.validation.bands import summary
+
+            found["bands"] = summary(self.bands, self.case, self.reference)
+        return found
+
+    def _repr_html_(self) -> str:
+        title = f"{self.case.title}, {self.case.vehicle}; {version_words(self.database)}"
+        rows = [
+            (s, c, f"{e.rmse:.4g}", e.unit, None if e.ratio is None else f"{e.ratio:.2f}")
+            for s, channels in self.errors.items()
+            for c, e in channels.items()
+        ]
+        errors = html_table(title, ("reference", "channel", "RMSE", "unit", "ratio to published model"), rows)
+        labels = list(next(iter(self.metrics.values()), {}))
+        measured = [
+            (m, *(None if values[k] is None else f"{values[k]:.4g}" for k in labels))
+            for m, values in self.metrics.items()
+        ]
+        return errors + (html_table("metrics", ("metric", *labels), measured) if measured else "")
