@@ -89,7 +89,15 @@ def whole(path: Path) -> Iterator[Path]:
 
 
 class Results(tuple[T, ...]):
-    """Results of one kind, one a campaign or state, that a notebook shows below each other."""
+    """Results of one kind, one a campaign, that a notebook shows below each other.
+
+    Examples
+    --------
+    >>> import ident
+    >>> results = ident.check("my-boat/captive")
+    >>> len(results), results.to_dict()[0]["campaign"]
+    (1, 'my-boat-tank')
+    """
 
     def to_dict(self) -> list[Any]:
         """``to_dict()`` of each, for a program to read."""

@@ -37,8 +37,10 @@ _VERTICAL_INERTIA, _HORIZONTAL_INERTIA = (2, 4), (1, 5)
 _PLANES = ("vertical", "horizontal")
 _TABLE_STEP = 1e-4
 _DEFLECTION = math.radians(1.0)
-_TABLED = ("speed", "depth", "g_vertical", "g_horizontal", "neutral_point_vertical", "neutral_point_horizontal")
-_TABLED += ("critical_speed_stern", "critical_speed_sail")
+_TABLED = (
+    *("speed", "depth", "g_vertical", "g_horizontal", "neutral_point_vertical", "neutral_point_horizontal"),
+    *("critical_speed_stern", "critical_speed_sail"),
+)
 
 
 @dataclass(frozen=True)

@@ -27,7 +27,7 @@ from scipy.optimize import least_squares, minimize_scalar
 from ident.calibration.file import CalibrationFile, Parameter, Training, apply
 from ident.validation.validate import check_reference
 from sim.boat.coefficients import Coefficients
-from sim.boat.vehicle import Vehicle
+from sim.boat.vehicle import Vehicle, load_vehicle
 from sim.files.errors import InputError
 from sim.flight.case import Case, Series, load_case, load_reference
 from sim.flight.simulate import Simulation, environment_of, equipped, fly, water_of
@@ -248,8 +248,10 @@ def problem(
         case, place = load_case(own if training.case.endswith(".toml") else training.case)
         reference = load_reference(case, place)
         check_reference(case, reference, place)
-        if case.vehicle != vehicle.name:
-            raise _refuse(where, training, "case", f"a case of {case.vehicle}", [f"a case of {vehicle.name}"])
+        # A case names its vehicle, or the vehicle's file.
+        flown = load_vehicle(case.vehicle, beside=place).name
+        if flown != vehicle.name:
+            raise _refuse(where, training, "case", f"a case of {flown}", [f"a case of {vehicle.name}"])
         for key, source in (("source", training.source), ("differs_from", training.differs_from)):
             if source and source not in reference.data:
                 raise _refuse(where, training, key, source, list(reference.data))

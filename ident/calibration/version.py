@@ -51,8 +51,10 @@ class Calibrated:
     Examples
     --------
     >>> import ident
-    >>> done = ident.calibrate("bb2", db="bb2_db")  # doctest: +SKIP
-    >>> done.groups.loc["stern_planes", ["prior", "posterior"]]  # doctest: +SKIP
+    >>> _ = ident.fit("my-boat/captive", db="trained_db")
+    >>> done = ident.calibrate("my-boat/calibration.toml", db="trained_db", left_out=False)
+    >>> done.groups.loc["rudders", "verdict"]
+    'within the captive error'
     """
 
     summary: dict[str, Any]
@@ -289,10 +291,11 @@ def calibrate(
 
     Examples
     --------
-    The bundled calibration takes minutes; with a file of your own, see the page on calibration.
-
     >>> import ident
-    >>> done = ident.calibrate("bb2", db="bb2_db")  # doctest: +SKIP
+    >>> _ = ident.fit("my-boat/captive", db="calibrated_db")
+    >>> done = ident.calibrate("my-boat/calibration.toml", db="calibrated_db", left_out=False)
+    >>> done.version, list(done.groups.index)
+    (1, ['rudders', 'yaw_damping'])
     """
     name, db = os.fspath(name), os.fspath(db)
     spec, where, own = load_calibration(name)

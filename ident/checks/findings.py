@@ -37,6 +37,14 @@ class Finding:
     columns : Columns concerned.
     what : What was found, with numbers.
     remedy : What to do.
+
+    Examples
+    --------
+    >>> import ident
+    >>> (checked,) = ident.check("my-boat/captive")
+    >>> finding = checked.findings[0]
+    >>> finding.severity, finding.file.endswith((".csv", ".toml"))
+    ('warning', True)
     """
 
     check: str

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Hashable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -45,16 +46,17 @@ def value_sources(rows: pd.DataFrame, commits: dict[str, Version]) -> list[str]:
     One text a row; of a version written before runs were kept with it, the campaign's name.
     """
     known = {name: json.loads(v.metadata.get("runs", "{}")) for name, v in commits.items()}
-    return [_source(row, known[row.vehicle], commits[row.vehicle]) for row in rows.itertuples(index=False)]
+    every = rows.to_dict("records")
+    return [_source(row, known[row["vehicle"]], commits[row["vehicle"]]) for row in every]
 
 
-def _source(row: Any, known: dict[str, Any], commit: Version) -> str:
-    if not row.runs:
-        return "zero by port/starboard symmetry" if row.origin == "symmetry" else str(row.origin)
+def _source(row: dict[Hashable, Any], known: dict[str, Any], commit: Version) -> str:
+    if not row["runs"]:
+        return "zero by port/starboard symmetry" if row["origin"] == "symmetry" else str(row["origin"])
     if not known:
         return f"campaign {commit.metadata.get('campaign', '')}"
     found: dict[tuple[int, int], list[int]] = {}
-    for run in row.runs.split():
+    for run in row["runs"].split():
         file, place, source = known["runs"].get(run, (-1, 0, -1))
         if file >= 0:
             found.setdefault((source, file), []).append(place)
@@ -62,7 +64,7 @@ def _source(row: Any, known: dict[str, Any], commit: Version) -> str:
     for (source, file), places in found.items():
         where = f"{known['files'][file]} row {' '.join(str(p) for p in sorted(places))}"
         texts.append(f"{known['sources'][source]} ({where})" if known["sources"][source] else where)
-    mirrored = "mirror image of: " if row.origin == "mirror" else ""
+    mirrored = "mirror image of: " if row["origin"] == "mirror" else ""
     return mirrored + "; ".join(texts)
 
 
@@ -89,8 +91,8 @@ def coefficient_array(rows: pd.DataFrame, name: str, commits: dict[str, Version]
 
     axes = [c for c in axis_columns() if rows[c].notna().any()]
     if rows[axes].isna().to_numpy().any():
-        found = ", ".join(sorted(rows["vehicle"].unique()))
-        raise InputError(f"coefficient {name}", f"different axes for {found}", "one vehicle: version.of(name)[...]")
+        ships = ", ".join(sorted(rows["vehicle"].unique()))
+        raise InputError(f"coefficient {name}", f"different axes for {ships}", "one vehicle: version.of(name)[...]")
     axes = [*(c for c in _WHOSE if rows[c].nunique() > 1), *axes]
     labels = {a: list(dict.fromkeys(rows[a])) if a in _WHOSE else sorted(rows[a].unique()) for a in axes}
     shape = tuple(len(labels[a]) for a in axes)

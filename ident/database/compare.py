@@ -29,6 +29,12 @@ class Change:
     added, removed, changed : Numbers of tabulated values.
     largest_relative_change : Over the largest value that the coefficient had.
     largest_change_in_stderr : In standard errors, the larger of the two versions'.
+
+    Examples
+    --------
+    >>> from ident import Change
+    >>> Change("my-boat", "N_v", 0, 0, 1, 0.02, 1.5).to_dict()["changed"]
+    1
     """
 
     vehicle: str
@@ -52,6 +58,13 @@ class Difference:
     ----------
     first, second : Version numbers.
     changes : In the order of the coefficients.
+
+    Examples
+    --------
+    >>> import ident
+    >>> db = ident.Database("coeff_db")
+    >>> db[0].diff(db[-1]).table.empty
+    True
     """
 
     first: int

@@ -45,7 +45,7 @@ class DatabaseVersion:
     ('my-boat',)
     >>> N_v = version["N_v"]
     >>> print(f"{N_v.item():.4f} +- {N_v.stderr.item():.4f}, {N_v.n_runs.item()} runs")
-    -0.0101 +- 0.0001, 16 runs
+    -0.0100 +- 0.0001, 12 runs
     >>> version.rows[["coefficient", "value", "stderr", "runs"]].shape[1]
     4
     """

@@ -37,6 +37,13 @@ class Need:
         the median of its kind where the term has none.
     now, planned : Relative standard error before and after; NaN without a value.
     tests : Tests that identify it.
+
+    Examples
+    --------
+    >>> import ident
+    >>> plan = ident.plan("my-boat/captive", target_rel=0.2)
+    >>> sorted({need.why for need in plan.needs})
+    ['no run', 'standard error']
     """
 
     name: str

@@ -188,7 +188,7 @@ def _grid(done: Validation, axes: Any) -> None:
         "ballast_kg": "ballast [kg]",
         "pitch_deg": "pitch [deg]",
     }
-    grid = done.grid
+    grid = done.grid or []
     for axis, (key, label) in zip(axes, names.items(), strict=True):
         for depth in sorted({p["depth_m"] for p in grid}):
             points = [p for p in grid if p["depth_m"] == depth and p[key] is not None]

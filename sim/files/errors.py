@@ -16,6 +16,15 @@ class InputError(Exception):
     where : File, with row and column where there is one.
     found : What was found.
     allowed : What is allowed there.
+
+    Examples
+    --------
+    >>> import ident
+    >>> try:
+    ...     ident.read_campaign("nowhere")
+    ... except ident.InputError as error:
+    ...     print(error.where, "|", error.found)
+    nowhere/campaign.toml | missing
     """
 
     def __init__(self, where: str, found: str, allowed: str) -> None:

@@ -66,6 +66,16 @@ class Plant:
         As ``sim.flight.simulate.model_of`` and ``water_of``.
     sim.flight.trim.NoEquilibrium
         When the case starts from self-propulsion and there is none.
+
+    Examples
+    --------
+    >>> import math
+    >>> import ident
+    >>> boat = ident.Plant.from_database("my-boat/zigzag.toml", "coeff_db")
+    >>> while boat.time < 60.0:  # hold the course 10 degrees to starboard
+    ...     _ = boat.step(dH=1.5 * (math.radians(10.0) - boat["psi"]) - 6.0 * boat["r"])
+    >>> round(math.degrees(boat["psi"]))
+    10
     """
 
     def __init__(self, case: Case, coefficients: Coefficients) -> None:

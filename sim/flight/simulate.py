@@ -54,6 +54,15 @@ class Simulation:
     end : (13,) time [s] and state at the end of the run, which an event may place between
         two records.
     waves : Of the run; None in deep, calm water.
+
+    Examples
+    --------
+    >>> import ident
+    >>> flight = ident.validate("my-boat/zigzag.toml", db="coeff_db").simulation
+    >>> flight.columns[:4]
+    ('t', 'u', 'v', 'w')
+    >>> flight["psi"].shape == flight["D0"].shape == flight["t"].shape
+    True
     """
 
     columns: tuple[str, ...]

@@ -14,7 +14,14 @@ Array = NDArray[np.float64]
 
 
 class NoEquilibrium(RuntimeError):
-    """No straight, level self-propelled state exists within the actuator limits."""
+    """No straight, level self-propelled state exists within the actuator limits.
+
+    Examples
+    --------
+    >>> import ident
+    >>> issubclass(ident.NoEquilibrium, RuntimeError)
+    True
+    """
 
 
 @dataclass(frozen=True)
