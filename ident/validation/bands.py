@@ -16,7 +16,7 @@ from scipy.special import chdtri
 from ident.validation.cluster import over_dask
 from ident.validation.draws import draw, scores
 from sim.boat.coefficients import Coefficients
-from sim.boat.row_codec import correlation_pairs
+from sim.boat.row_codec import correlation_matrix
 from sim.boat.vehicle import Vehicle
 from sim.files.errors import InputError
 from sim.flight.case import Case, Series, in_radians
@@ -65,27 +65,6 @@ class Bands:
         """Lower and upper edge of the 50 or 95 % band of a channel, as a source's record starts."""
         low, high = np.nanpercentile(self.own.get(source, self.channels)[channel], LEVELS[level], axis=0)
         return np.asarray(low), np.asarray(high)
-
-
-def covariance(rows: pd.DataFrame) -> tuple[pd.DataFrame, Array]:
-    """One row an estimate, and the correlation matrix of the estimates.
-
-    Parameters
-    ----------
-    rows : Database rows of one vehicle.
-
-    Returns
-    -------
-    estimates : First row of each estimate, in the order of the matrix.
-    correlation : (n, n), unit diagonal.
-    """
-    known = rows[rows["estimate"] >= 0].drop_duplicates("estimate").reset_index(drop=True)
-    place = {int(e): i for i, e in enumerate(known["estimate"])}
-    matrix = np.eye(len(known))
-    for i, text in enumerate(known["correlation"]):
-        for other, coefficient in correlation_pairs(text).items():
-            matrix[i, place[other]] = coefficient
-    return known, 0.5 * (matrix + matrix.T)
 
 
 def _row_steps(rows: pd.DataFrame, estimates: pd.DataFrame) -> tuple[NDArray[np.int64], Array]:
@@ -201,7 +180,7 @@ def fly_samples(
     InputError
         When no sample has a self-propulsion state, or as ``ident.validation.cluster.over_dask``.
     """
-    estimates, correlation = covariance(rows)
+    estimates, correlation = correlation_matrix(rows)
     draws = draw(correlation, samples, seed)
     index, step = _row_steps(rows, estimates)
     value = rows["value"].to_numpy() + np.where(index >= 0, draws[:, index] * step, 0.0)
