@@ -8,10 +8,11 @@ from importlib.util import find_spec
 import numpy as np
 import pytest
 
-from ident.validation.bands import batch_of, covariance, fly_samples
+from ident.validation.bands import batch_of, fly_samples
 from ident.validation.cluster import over_dask
 from ident.validation.draws import draw
 from sim.boat.coefficients import Coefficients
+from sim.boat.row_codec import correlation_matrix
 from sim.files.errors import InputError
 from sim.flight.case import Start, load_case
 from sim.flight.simulate import environment_of, simulate
@@ -53,7 +54,7 @@ def test_more_samples_begin_with_the_same_samples(case, campaign, rows, alone):
 
 def test_sample_of_the_batch_is_the_single_run_of_its_coefficients(case, campaign, rows, alone):
     """Sample 3, its row values made here from the draw, flown through assemble as a single run is."""
-    estimates, correlation = covariance(rows)
+    estimates, correlation = correlation_matrix(rows)
     score = dict(zip(estimates["estimate"], draw(correlation, 4, seed=4)[3], strict=True))
     first = dict(zip(estimates["estimate"], estimates["value"], strict=True))
     values = [

@@ -16,9 +16,9 @@ from ident.calibration.file import apply, load_calibration, parameters
 from ident.calibration.version import calibrate as run
 from ident.calibration.version import calibrated_rows
 from ident.cli import main
-from ident.validation.bands import covariance
 from sim.boat.coefficients import Coefficients
 from sim.boat.database import own_version, read_rows, versions
+from sim.boat.row_codec import correlation_matrix
 from sim.files.errors import InputError
 from sim.flight.case import load_case
 from sim.flight.simulate import simulate
@@ -132,7 +132,7 @@ def test_calibrated_rows_carry_multiplier_and_its_error(task, estimate, rows):
     np.testing.assert_allclose(done["stderr"][part.rows], relative[part.rows], rtol=1e-6)
     assert (done["calibration"][inside] != "").all()
     assert (done["calibration"][~inside] == "").all()
-    _, matrix = covariance(done)
+    _, matrix = correlation_matrix(done)
     assert np.linalg.eigvalsh(matrix).min() > -1e-4
 
 

@@ -15,8 +15,9 @@ from hypothesis import given
 from hypothesis import settings as given_settings
 from hypothesis import strategies as st
 
-from ident.validation.bands import Bands, covariance, variance_shares
+from ident.validation.bands import Bands, variance_shares
 from ident.validation.draws import draw, factor, scores
+from sim.boat.row_codec import correlation_matrix
 from sim.files.errors import InputError
 
 # Core types of OpenBLAS and what a processor needs to execute them.
@@ -58,7 +59,7 @@ def _settings() -> list[dict[str, str]]:
 
 @pytest.fixture(scope="module")
 def correlation(rows):
-    return covariance(rows)[1]
+    return correlation_matrix(rows)[1]
 
 
 def test_draws_and_what_follows_are_the_same_under_any_linear_algebra(correlation, tmp_path):

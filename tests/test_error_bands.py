@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ident.validation.bands import Bands, covariance, fly_samples, inside, variance_shares
+from ident.validation.bands import Bands, fly_samples, inside, variance_shares
 from ident.validation.draws import draw
 from sim.boat.coefficients import Coefficients
+from sim.boat.row_codec import correlation_matrix
 from sim.flight.case import load_case, load_reference
 from sim.flight.simulate import simulate
 
@@ -20,7 +21,7 @@ def short_case():
 
 def test_draws_have_the_stored_covariance(rows):
     """Sample variances and the correlations of the database, to their sampling error."""
-    estimates, correlation = covariance(rows)
+    estimates, correlation = correlation_matrix(rows)
     drawn = draw(correlation, 4000, seed=3)
     assert drawn.shape == (4000, len(estimates))
     assert np.abs(drawn.std(axis=0) - 1.0).max() < 0.06
@@ -31,7 +32,7 @@ def test_draws_have_the_stored_covariance(rows):
 
 
 def test_a_sample_does_not_depend_on_how_many_are_drawn(rows):
-    _, correlation = covariance(rows)
+    _, correlation = correlation_matrix(rows)
     assert np.array_equal(draw(correlation, 5, seed=1), draw(correlation, 9, seed=1)[:5])
     assert not np.array_equal(draw(correlation, 5, seed=1), draw(correlation, 5, seed=2))
 
@@ -53,7 +54,7 @@ def test_without_errors_every_sample_is_the_single_run(short_case, campaign, row
 
 def test_a_drawn_boat_is_port_starboard_symmetric(campaign, rows):
     """Rows of one estimate move together: Y, K and N stay odd in beta."""
-    estimates, correlation = covariance(rows)
+    estimates, correlation = correlation_matrix(rows)
     step = draw(correlation, 1, seed=5)[0]
     place = dict(zip(estimates["estimate"], range(len(estimates)), strict=True))
     base = Coefficients(campaign.vehicle, rows)

@@ -225,9 +225,10 @@ def test_a_covariance_is_that_of_the_rows(bb2):
 
 def test_a_sum_of_values_has_the_variance_that_error_bands_draw(bb2):
     """w^T R w, with the steps that one draw of each estimate makes in the rows."""
-    from ident.validation.bands import _row_steps, covariance
+    from ident.validation.bands import _row_steps
+    from sim.boat.row_codec import correlation_matrix
 
-    estimates, correlation = covariance(bb2.rows)
+    estimates, correlation = correlation_matrix(bb2.rows)
     index, step = _row_steps(bb2.rows, estimates)
     chosen = bb2.rows["coefficient"].isin(["M_uq", "M_uvw"]).to_numpy() & (index >= 0)
     weight = np.bincount(index[chosen], step[chosen], len(estimates))
