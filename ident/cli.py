@@ -7,7 +7,7 @@ from typing import Any
 import click
 
 from ident import __version__
-from ident.commands import animate, campaigns, doctor, maneuvers, start, trials, versions
+from ident.commands import animate, campaigns, doctor, flights, maneuvers, start, trials, versions
 
 
 class Commands(click.Group):
@@ -48,7 +48,7 @@ def main() -> None:
     """
 
 
-for _module in (start, campaigns, maneuvers, trials, animate, versions, doctor):
+for _module in (start, campaigns, maneuvers, trials, flights, animate, versions, doctor):
     for _command in vars(_module).values():
         if isinstance(_command, click.Command):
             main.add_command(_command)

@@ -1,0 +1,66 @@
+"""Command that writes a flight: fly."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from ident.commands.shared import DB, VERSION, console_for, emit, equilibrium_of, json_to, out_file
+
+
+@click.command()
+@click.option("--case", "case", required=True, help="Bundled case name, or path to a case file.")
+@click.option("--vehicle", default=None, help="Bundled vehicle or path to a vehicle file, instead of the case's.")
+@DB
+@VERSION
+@out_file("File to write, .csv, .parquet or .nc; CASE_vVERSION.csv by default.")
+@click.option("--every", type=click.FloatRange(min=0, min_open=True), default=None, help="Seconds between records.")
+@click.option("--samples", type=click.IntRange(min=2), default=None, help="To .nc: so many sets drawn from the errors.")
+@click.option("--seed", type=click.IntRange(min=0), default=None, help="With --samples: seed of the draws, 0 without.")
+@click.option("--quantiles", default=None, metavar="Q,Q,...", help="With --samples: curves at these shares, 0 to 1.")
+@json_to("Write what was flown as JSON.")
+def fly(
+    case: str,
+    vehicle: str | None,
+    db: str,
+    version: int | None,
+    out: Path | None,
+    every: float | None,
+    samples: int | None,
+    seed: int | None,
+    quantiles: str | None,
+    json_path: str | None,
+) -> None:
+    """Fly a maneuver and write its history: states, planes, commands, flow angles, surface.
+
+    Program frame, SI and radians, every digit.
+
+    \b
+    Example: ident fly --case hzz20 --out hzz20.csv
+             ident fly --case ss5-4m --every 0.5 --out ss5.nc
+             ident fly --case hzz20 --samples 200 --quantiles 0.025,0.5,0.975 --out band.nc
+    """
+    if not samples and (quantiles or seed is not None):
+        raise click.UsageError("--quantiles and --seed go with --samples")
+    from ident.exports.fly import fly_to_file
+
+    console = console_for(quiet=json_path == "-")
+    with equilibrium_of(case), console.status("flying the case"):
+        done = fly_to_file(case, db, version, vehicle, out, every, samples, seed or 0, _shares(quantiles))
+    console.print(f"history: {done['file']}, {done['records']} records", highlight=False)
+    if json_path:
+        emit(done, json_path)
+
+
+def _shares(text: str | None) -> tuple[float, ...]:
+    """Quantiles as they are typed."""
+    if text is None:
+        return ()
+    try:
+        shares = tuple(float(word) for word in text.split(","))
+    except ValueError as error:
+        raise click.UsageError(f"--quantiles {text}: numbers between 0 and 1, with commas") from error
+    if not all(0.0 <= share <= 1.0 for share in shares):
+        raise click.UsageError(f"--quantiles {text}: numbers between 0 and 1, with commas")
+    return shares
