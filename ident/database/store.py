@@ -43,6 +43,9 @@ FOR_EVER = {
 
 Array = NDArray[np.float64]
 
+# Disagreements are kept to a billionth of a standard error.
+_RESIDUAL_DIGITS = 9
+
 
 def database_rows(found: Identification) -> pd.DataFrame:
     """The rows of the database for one identified campaign, completed by symmetry.
@@ -88,7 +91,8 @@ def database_rows(found: Identification) -> pd.DataFrame:
                     "calibration": "",
                     "estimate": index if sign else -1,
                     "correlation": correlated.get(index, "") if sign else "",
-                    "worst_residual": node.worst if sign else 0.0,
+                    # Runs that agree leave rounding, which differs between processors.
+                    "worst_residual": round(node.worst, _RESIDUAL_DIGITS) if sign else 0.0,
                     "extrapolation": " ".join(f"{a}:{r}" for a, r in term.extrapolation.items()),
                     "equation": term.equation,
                     "runs": " ".join(dict.fromkeys(node.runs)) if sign else "",
