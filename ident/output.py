@@ -1,4 +1,4 @@
-"""What leaves the program: files, written whole or not at all, and tables of a notebook."""
+"""What leaves the program: files, written whole or not at all, tables of a notebook, progress."""
 
 from __future__ import annotations
 
@@ -6,15 +6,22 @@ import contextlib
 import glob
 import os
 import platform
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from html import escape
 from pathlib import Path
 from typing import Any, TypeVar
 
 T = TypeVar("T")
 
+# Told of long work as it goes on: what is being done, how much of it is done, and of how much.
+Tell = Callable[[str, int, int], None]
+
 # Folders may be shared with other machines, whose processes this one does not see.
 _HOST = platform.node().replace("/", "_")
+
+
+def silent(what: str, done: int, of: int) -> None:
+    """A ``Tell`` that nobody listens to."""
 
 
 def check_folder(path: Path) -> None:

@@ -34,7 +34,7 @@ from ident.captive.readers.opening import inputs
 from ident.captive.run_table import DIRECT, MEASURED, NUMBERS, run_table, sigma
 from ident.captive.runs import Found, source_runs
 from ident.captive.source import Source
-from ident.output import html_table
+from ident.output import Tell, html_table, silent
 from sim.boat.catalogue import OUTPUTS
 from sim.boat.vehicle import Vehicle, load_vehicle
 from sim.files.errors import InputError
@@ -118,13 +118,14 @@ def _check_words(folder: Path, runs: pd.DataFrame, allowed: dict[str, list[str]]
             raise InputError(place, repr(run[column]), ", ".join(words))
 
 
-def read_runs(folder: Path, header: CampaignFile, vehicle: Vehicle) -> tuple[pd.DataFrame, Found]:
+def read_runs(folder: Path, header: CampaignFile, vehicle: Vehicle, tell: Tell = silent) -> tuple[pd.DataFrame, Found]:
     """The checked runs of every source, in SI and radians but still in the campaign's frame.
 
     Parameters
     ----------
     folder : The campaign's.
     header, vehicle : For the sources, the quality vocabulary and the names of the parts.
+    tell : Told of every file.
 
     Returns
     -------
@@ -139,7 +140,7 @@ def read_runs(folder: Path, header: CampaignFile, vehicle: Vehicle) -> tuple[pd.
     found = Found()
     words = {"test": list(tests().index), "part": vehicle.part_names(), "quality": list(header.quality)}
     for source in _sources(folder, header):
-        for table in source_runs(folder, source, header, found):
+        for table in source_runs(folder, source, header, found, tell):
             _check_words(folder, table, {**words, "decoupled": ["", "True", "False"]})
             _check_complete(folder, table)
     runs = pd.concat(found.tables, ignore_index=True) if found.tables else pd.DataFrame()
@@ -203,7 +204,7 @@ def _check_complete(folder: Path, runs: pd.DataFrame) -> None:
                 raise InputError(f"{place}, column rel_sigma", "nothing", f"a number, or sigma_{bare[0]}_<unit>")
 
 
-def read_campaign(folder: str | os.PathLike[str], leave_out: bool = False) -> Campaign:
+def read_campaign(folder: str | os.PathLike[str], leave_out: bool = False, tell: Tell = silent) -> Campaign:
     """Read one captive campaign and turn it to the program frame.
 
     Parameters
@@ -211,6 +212,7 @@ def read_campaign(folder: str | os.PathLike[str], leave_out: bool = False) -> Ca
     folder : Folder with ``campaign.toml`` and the files of runs.
     leave_out : Leave histories whose time stamps do not rise to the quality checks, instead of
         refusing them all in one message.
+    tell : Told of every file.
 
     Returns
     -------
@@ -235,7 +237,7 @@ def read_campaign(folder: str | os.PathLike[str], leave_out: bool = False) -> Ca
     vehicle = load_vehicle(header.vehicle, beside=folder / "campaign.toml")
     frame = header.frame.declared(f"{where}, [frame]")
     _check_named(header, vehicle, where)
-    runs, found = read_runs(folder, header, vehicle)
+    runs, found = read_runs(folder, header, vehicle, tell)
     if not leave_out:
         _refuse(found.refused)
     digests = {"campaign.toml": hashlib.sha256(raw).hexdigest()}

@@ -23,6 +23,7 @@ from ident.captive.readers.text import LARGEST, Dialect
 from ident.captive.run_table import DIRECT, REQUIRED, STATES, TEXT
 from ident.captive.source import NO_COLUMNS, Source
 from ident.captive.subtract import off_samples, off_table, taken_columns
+from ident.output import Tell, silent
 from sim.boat.catalogue import OUTPUTS
 from sim.files.errors import InputError
 
@@ -50,7 +51,9 @@ class Found:
     inputs: list[Path] = field(default_factory=list)
 
 
-def source_runs(folder: Path, source: Source, header: CampaignFile, found: Found) -> list[pd.DataFrame]:
+def source_runs(
+    folder: Path, source: Source, header: CampaignFile, found: Found, tell: Tell = silent
+) -> list[pd.DataFrame]:
     """Add all runs of one source to what was found.
 
     Parameters
@@ -59,6 +62,7 @@ def source_runs(folder: Path, source: Source, header: CampaignFile, found: Found
     source : One ``[[source]]``.
     header : The campaign, for frame, scale and density.
     found : Its lists grow.
+    tell : Told of every file.
 
     Returns
     -------
@@ -72,7 +76,8 @@ def source_runs(folder: Path, source: Source, header: CampaignFile, found: Found
     paths = matching(folder, source)
     where = str(folder / "campaign.toml")
     tables: list[pd.DataFrame] = []
-    for path in paths:
+    for done, path in enumerate(paths):
+        tell(f"reading {source.files}", done, len(paths))
         stated = constants(folder, path, source)
         name = path.relative_to(folder).as_posix()
         try:
@@ -87,6 +92,7 @@ def source_runs(folder: Path, source: Source, header: CampaignFile, found: Found
             found.refused.append(error)
             continue
         tables.append(outside_excluded(table.assign(file=name), source, where))
+    tell(f"reading {source.files}", len(paths), len(paths))
     found.tables += tables
     found.inputs += paths
     return tables

@@ -26,6 +26,7 @@ from ident.checks import runs as checks_runs
 from ident.checks import tables as checks_tables
 from ident.checks.findings import SEVERITIES, Body, Evidence, Finding, registered, rules
 from ident.identification.identify import Identification, identify
+from ident.output import Tell, silent
 from sim.files.errors import InputError
 
 if TYPE_CHECKING:
@@ -132,21 +133,29 @@ def read_labels(folder: Path) -> pd.DataFrame | None:
     return pd.DataFrame(found, columns=["sheet", "column", "description", "file", "row"]) if found else None
 
 
-def run(evidence: Evidence) -> list[Finding]:
+def run(evidence: Evidence, tell: Tell = silent) -> list[Finding]:
     """Every finding of every check, errors first.
 
     Parameters
     ----------
     evidence : What there is; checks without their evidence find nothing.
+    tell : Told of every check.
     """
     # Numbers no boat has must not stop the check that says so.
     with np.errstate(all="ignore"):
-        found = [f for name, own in registered().items() for check in own for f in check(evidence, rules()[name])]
+        checks = [(name, check) for name, own in registered().items() for check in own]
+        found: list[Finding] = []
+        for done, (name, check) in enumerate(checks, start=1):
+            found += check(evidence, rules()[name])
+            tell("checking", done, len(checks))
     return sorted(found, key=lambda f: -SEVERITIES.index(f.severity))
 
 
 def check_campaign(
-    campaign: Campaign, folder: Path | None = None, identified: Identification | None = None
+    campaign: Campaign,
+    folder: Path | None = None,
+    identified: Identification | None = None,
+    tell: Tell = silent,
 ) -> list[Finding]:
     """Quality checks of a campaign, errors first.
 
@@ -156,11 +165,12 @@ def check_campaign(
     folder : Where it lies, for what stands beside the runs.
     identified : Its coefficients, where they are at hand: constant ones are checked as a table
         of derivatives, and identified for it otherwise.
+    tell : Told of every check.
     """
     evidence = evidence_of(campaign, folder)
     if campaign.vehicle.term_set != "reduced" and not campaign.runs.empty:
         evidence = replace(evidence, derivatives=constants(identified or identify(campaign)))
-    return run(evidence)
+    return run(evidence, tell)
 
 
 def constants(found: Identification) -> pd.DataFrame:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import click
 
-from ident.commands.shared import DB, OUT, WAIT, console_for, emit, json_to, out_file
+from ident.commands.shared import DB, OUT, WAIT, console_for, emit, json_to, out_file, told
 
 
 @click.command()
@@ -29,8 +29,8 @@ def fit(folder: Path, db: str, message: str, json_path: str | None, strict: bool
     from ident.fitting.fit import show
 
     console = console_for(quiet=json_path == "-")
-    with console.status("reading, checking and identifying"):
-        done = ident.fit(folder, db, message, strict, wait)
+    with told() as tell:
+        done = ident.fit(folder, db, message, strict, wait, tell)
     for one in done:
         show(one, console)
     if json_path:

@@ -95,3 +95,20 @@ def console_for(quiet: bool = False) -> Any:
 
     # A pipe has no width of its own; tables are cut less when it is generous.
     return Console(quiet=quiet, width=None if sys.stdout.isatty() else 140)
+
+
+@contextmanager
+def told() -> Iterator[Any]:
+    """Shows what a long command does on standard error, with the time left: yields an ``ident.output.Tell``."""
+    from rich.console import Console
+    from rich.progress import Progress, TaskID
+
+    with Progress(console=Console(stderr=True), transient=True) as shown:
+        tasks: dict[str, TaskID] = {}
+
+        def tell(what: str, done: int, of: int) -> None:
+            if what not in tasks:
+                tasks[what] = shown.add_task(what, total=of)
+            shown.update(tasks[what], completed=done, total=of, visible=done < of)
+
+        yield tell

@@ -18,7 +18,7 @@ from ident.database.provenance import conversions, run_sources
 from ident.database.store import commit, database_rows, digest
 from ident.fitting.notes import group_unused, group_warnings
 from ident.identification.identify import Identification, identify
-from ident.output import Results, html_table
+from ident.output import Results, Tell, html_table, silent
 from sim.files.errors import InputError
 
 if TYPE_CHECKING:
@@ -115,6 +115,7 @@ def fit(
     message: str = "",
     strict: bool = False,
     wait: float = WAIT,
+    tell: Tell = silent,
 ) -> Results[Fit]:
     """Identify the coefficients of every campaign at or below a folder; commit one version each.
 
@@ -129,6 +130,7 @@ def fit(
     message : Stored with the version.
     strict : Refuse a campaign with a quality finding of severity ``error``.
     wait : How long to wait for other writers of the database [s].
+    tell : Told what is done, how much of it, and of how much.
 
     Returns
     -------
@@ -159,14 +161,14 @@ def fit(
     """
     path_of_db = os.fspath(db)
     paths = find_campaigns(Path(folder))
-    read = [read_campaign(path) for path in paths]
+    read = [read_campaign(path, tell=tell) for path in paths]
     names = [campaign.vehicle.name for campaign in read]
     for path, name in zip(paths, names, strict=True):
         if names.count(name) > 1:
             text = "one campaign a vehicle: a version replaces all rows of its vehicle"
             raise InputError(str(path / "campaign.toml"), f"vehicle {name!r} has {names.count(name)} campaigns", text)
-    identified = [identify(campaign) for campaign in read]
-    checked = [check_campaign(*one) for one in zip(read, paths, identified, strict=True)]
+    identified = [identify(campaign, tell) for campaign in read]
+    checked = [check_campaign(*one, tell) for one in zip(read, paths, identified, strict=True)]
     if strict:
         for path, findings in zip(paths, checked, strict=True):
             refuse_errors(path, findings)

@@ -24,6 +24,7 @@ from ident.identification.equations import Runs
 from ident.identification.nodes import Node, table_points
 from ident.identification.solver import Solver, check_levers
 from ident.identification.wake import wake_fraction
+from ident.output import Tell, silent
 from sim.boat.catalogue import Term
 from sim.boat.parts import Point
 
@@ -76,12 +77,13 @@ def _propulsion_point(solver: Solver, runs: pd.DataFrame) -> None:
     solver.tables.clear()
 
 
-def identify(campaign: Campaign) -> Identification:
+def identify(campaign: Campaign, tell: Tell = silent) -> Identification:
     """Every coefficient the campaign supports, with covariance.
 
     Parameters
     ----------
     campaign : From ``read_campaign``.
+    tell : Told of the runs of every stage.
 
     Returns
     -------
@@ -92,9 +94,13 @@ def identify(campaign: Campaign) -> Identification:
     stages = tests()["stage"]
     runs = Runs.of(campaign.runs)
     at = campaign.runs["test"].map(stages).to_numpy()
+    done = 0
     for stage in sorted(stages.unique()):
         rows, first = np.flatnonzero(at == stage), len(solver.nodes)
+        tell("identifying", done, len(at))
+        done += len(rows)
         solver.solve(runs, solver.equations(runs, rows), first)
         solver.tables.clear()
         _propulsion_point(solver, campaign.runs.iloc[rows])
+    tell("identifying", len(at), len(at))
     return Identification(campaign, solver.nodes, solver.values, solver.covariance, solver.unused, solver.warnings)
