@@ -144,7 +144,6 @@ def test_dimensionless_loads_give_the_same_coefficients(tables, rows, tmp_path, 
         speed = number(table["U_mps"]) if "U_mps" in table else pd.Series(0.0, index=table.index)
         if not (speed > 0).all() or file == "acceleration.csv":
             continue
-        primed.append(file)
         names = {}
         for load in "XYZKMN":
             column = f"{load}_N" if load in "XYZ" else f"{load}_Nm"
@@ -157,6 +156,7 @@ def test_dimensionless_loads_give_the_same_coefficients(tables, rows, tmp_path, 
                 table[f"{rate}_radps"] = text(number(table[f"{rate}_radps"]) * length / speed)
                 names[f"{rate}_radps"] = f"{rate} [-]"
         other[file] = table.rename(columns=names)
+        primed += [file] if names else []
     assert len(primed) > 4
     plain = [f for f in other if f not in primed]
     sources = "".join(f'[[source]]\nfiles = "{f}"\nnormalisation = "{name}"\n' for f in primed)
@@ -220,15 +220,17 @@ def test_tare_and_strut_are_taken_off_in_the_campaigns_frame(tmp_path):
     tare = (
         '[[tare]]\nwhat = "zero reading"\nsource = "log"\nloads = { X = "0.5 kN", N = "-20 N*m" }\n'
         '[[tare]]\nwhat = "strut"\nsource = "towed alone"\nper_speed_squared = { X = 30.0 }\n'
-        '[[tare]]\nwhat = "other"\nsource = "log"\nloads = { Y = "9 N" }\ntests = ["towing"]\n'
     )
     frame = 'x = "aft"\ny = "starboard"\nz = "up"\nangles = "flight"'
     run = one(tmp_path, "X_N,Y_N,N_Nm", "1000,5,100", sources=tare, frame=frame)
     assert run["X"] == pytest.approx(-(1000.0 - 500.0 - 30.0 * 4.0))
     assert run["Y"] == 5.0
     assert run["N"] == pytest.approx(-120.0)
-    with pytest.raises(InputError, match=r"tare\.2\.tests: 'tow'"):
-        one(tmp_path, "X_N", "1000", sources=tare.replace('"towing"', '"tow"'))
+    other = '[[tare]]\nwhat = "other"\nsource = "log"\nloads = { Y = "9 N" }\ntests = ["towing"]\n'
+    with pytest.raises(InputError, match=r"tare\.0\.loads: no run it applies to measures Y"):
+        one(tmp_path, "X_N,Y_N", "1000,5", sources=other)
+    with pytest.raises(InputError, match=r"tare\.0\.tests: 'tow'"):
+        one(tmp_path, "X_N", "1000", sources=other.replace('"towing"', '"tow"'))
     with pytest.raises(InputError, match=r"tare\.0\.loads\.X"):
         one(tmp_path, "X_N", "1000", sources=tare.replace("0.5 kN", "0.5 m"))
 

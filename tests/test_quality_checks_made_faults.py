@@ -269,17 +269,26 @@ def test_check_command_json_and_strict(spoiled):
     assert slip["remedy"]
 
 
-def test_strict_fit_commits_nothing_and_says_where(spoiled, tmp_path):
+def test_fit_with_an_error_commits_nothing_unless_a_reason_is_stored(spoiled, tmp_path):
     db = tmp_path / "db"
-    refused = CliRunner().invoke(main, ["fit", str(spoiled), "--db", str(db), "--strict"])
+    refused = CliRunner().invoke(main, ["fit", str(spoiled), "--db", str(db)])
     assert refused.exit_code == 2
     assert "drift_horizontal.csv, row 20, column K" in refused.output
     assert not db.exists()
-    done = CliRunner().invoke(main, ["fit", str(spoiled), "--db", str(db)])
+    done = CliRunner().invoke(main, ["fit", str(spoiled), "--db", str(db), "--force", "K is not used"])
     assert done.exit_code == 0
     assert "factor" in done.output
-    stored = json.loads(versions(str(db))[-1].metadata["checks"])
-    assert any(f["check"] == "factor" for f in stored)
+    metadata = versions(str(db))[-1].metadata
+    assert metadata["forced"] == "K is not used"
+    assert any(f["check"] == "factor" for f in json.loads(metadata["checks"]))
+
+
+def test_a_reason_without_an_error_is_refused(tmp_path):
+    sound = Path(__file__).parents[1] / "raw_captive_data" / "suboff"
+    done = CliRunner().invoke(main, ["fit", str(sound), "--db", str(tmp_path / "db"), "--force", "to be sure"])
+    assert done.exit_code == 2
+    assert "no check finds an error" in done.output
+    assert not (tmp_path / "db").exists()
 
 
 def test_the_report_shows_the_findings_of_the_commit(rows, bundled, tmp_path):

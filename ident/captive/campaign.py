@@ -19,13 +19,18 @@ import numpy as np
 import pandas as pd
 
 from ident.captive import published
+from ident.captive.axes import to_body
 from ident.captive.campaign_file import CampaignFile, read_header
 from ident.captive.conversions import (
+    arm_rates,
+    deflected_left_out,
     move_moments,
     standard_errors,
+    tare_applies,
     to_full_scale,
     turn,
     whole_model,
+    without_hydrostatics,
     without_inertia,
     without_tare,
 )
@@ -36,6 +41,7 @@ from ident.captive.runs import Found, source_runs
 from ident.captive.source import Source
 from ident.output import Tell, html_table, silent
 from sim.boat.catalogue import OUTPUTS
+from sim.boat.parts import vehicle_terms
 from sim.boat.vehicle import Vehicle, load_vehicle
 from sim.files.errors import InputError
 from sim.files.frames import Frame
@@ -142,7 +148,7 @@ def read_runs(folder: Path, header: CampaignFile, vehicle: Vehicle, tell: Tell =
     for source in _sources(folder, header):
         for table in source_runs(folder, source, header, found, tell):
             _check_words(folder, table, {**words, "decoupled": ["", "True", "False"]})
-            _check_complete(folder, table)
+            _check_complete(folder, table, vehicle)
     runs = pd.concat(found.tables, ignore_index=True) if found.tables else pd.DataFrame()
     for column in NUMBERS:
         if column not in runs:
@@ -178,11 +184,14 @@ def _doubtful(runs: pd.DataFrame) -> pd.Series:
     return found
 
 
-def _check_complete(folder: Path, runs: pd.DataFrame) -> None:
+def _check_complete(folder: Path, runs: pd.DataFrame, vehicle: Vehicle) -> None:
     """Every run has what its test needs, a load or coefficient, and an error to go with it."""
+    deep = any("D0" in term.axes for term in vehicle_terms(vehicle))
     for _, run in runs[_doubtful(runs)].iterrows():
         place = f"{folder / run['file']}, row {run['row']}"
         for need in str(tests().loc[run["test"], "requires"]).split():
+            if need == "D0" and not deep:
+                continue
             quantity = "plane" if need == "delta" else need
             if pd.isna(run.get(quantity, np.nan)):
                 raise InputError(f"{place}, column {quantity}", "nothing", f"a number: a {run['test']} run needs it")
@@ -247,9 +256,11 @@ def read_campaign(folder: str | os.PathLike[str], leave_out: bool = False, tell:
     if runs.empty:
         return Campaign(header, vehicle, run_table({}), digests, *histories)
     runs["copy_of"] = _originals(folder, runs)
+    _check_used(header, runs, where)
     point = frame.vector([header.moment_point.x_m, header.moment_point.y_m, header.moment_point.z_m])
-    length = header.scale.ratio * header.scale.length_m
-    runs = published.to_program(runs, vehicle, frame, length, point, str(folder))
+    runs = arm_rates(runs, str(folder))
+    runs = published.to_program(runs, vehicle, header, point, str(folder))
+    runs = deflected_left_out(runs, vehicle)
     runs = _in_program_frame(runs, header, frame, where)
     bad = (
         ~np.isfinite(runs[[*OUTPUTS, *(f"s_{o}" for o in OUTPUTS)]])
@@ -266,6 +277,7 @@ def _check_named(header: CampaignFile, vehicle: Vehicle, where: str) -> None:
     """Tests and parts that ``[inertia]`` and ``[[tare]]`` name exist: a slip would take nothing off."""
     known = {"tests": list(tests().index), "parts": vehicle.part_names()}
     named = [("inertia", "parts", header.inertia.parts if header.inertia.model_inertia_in_loads else [])]
+    named += [("hydrostatics", "parts", header.hydrostatics.parts)] if header.hydrostatics else []
     named += [(f"tare.{k}", key, getattr(tare, key)) for k, tare in enumerate(header.tare) for key in known]
     for table, key, words in named:
         for word in words:
@@ -273,11 +285,32 @@ def _check_named(header: CampaignFile, vehicle: Vehicle, where: str) -> None:
                 raise InputError(f"{where}, key {table}.{key}", repr(word), ", ".join(known[key]))
 
 
+def _check_used(header: CampaignFile, runs: pd.DataFrame, where: str) -> None:
+    """Every tare, inertia and hydrostatic load has a run that it is taken off."""
+    for k, tare in enumerate(header.tare):
+        own = runs[tare_applies(runs, tare)]
+        for key in ("loads", "per_speed_squared"):
+            for output in getattr(tare, key):
+                if own[output].isna().all():
+                    found = f"no run it applies to measures {output}"
+                    raise InputError(f"{where}, key tare.{k}.{key}", found, "tests, parts and components of the runs")
+        if not (tare.loads or tare.per_speed_squared):
+            raise InputError(f"{where}, key tare.{k}", "no load", "loads or per_speed_squared: nothing is taken off")
+    tables = [("inertia", header.inertia.parts)] if header.inertia.model_inertia_in_loads else []
+    tables += [("hydrostatics", header.hydrostatics.parts)] if header.hydrostatics else []
+    for name, parts in tables:
+        for part in parts:
+            if not (runs["part"] == part).any():
+                raise InputError(f"{where}, key {name}.parts", f"{part!r}, and no run of it", "parts of the runs")
+
+
 def _in_program_frame(runs: pd.DataFrame, header: CampaignFile, frame: Frame, where: str) -> pd.DataFrame:
     """Every conversion, in the order of ``ident.captive.conversions``."""
     ratio, point = header.scale.ratio, header.moment_point
     runs = turn(without_tare(runs, header.tare, where), frame, header.frame.angles)
+    runs = to_body(runs, runs["axes"] != "body", runs["axes"] == "flow")
     runs = move_moments(runs, frame.vector([point.x_m, point.y_m, point.z_m]))
+    runs = without_hydrostatics(runs, header, frame)
     runs = whole_model(without_inertia(runs, header, frame), header)
     return standard_errors(to_full_scale(runs, ratio), header, ratio * header.scale.length_m)
 

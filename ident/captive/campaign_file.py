@@ -22,11 +22,16 @@ class CampaignFrame(FrameData):
     ----------
     angles : ``flight``: beta = asin(v/U), positive with starboard windward. ``ittc``: the
         ship's drift angle, positive with port windward.
+    axes : What the loads are along. ``body``: axes fixed in the body. ``flow``: x along the body's
+        own velocity, so that minus x is drag; y and z turned with it (drag, side force and lift). ``tank``:
+        axes of the tank or mesh, x along the towing direction, in which the body stands at its
+        angles, or swings in an oscillation of yaw, pitch or roll. Directions are those of a body at zero angles.
     rotations : Sense of moments and rates about their axis, ``right-hand`` or ``left-hand``
         (N = x Y - y X in left-handed axes). A left-handed set has to state it.
     """
 
     angles: Literal["flight", "ittc"]
+    axes: Literal["body", "flow", "tank"] = "body"
     rotations: Literal["", "right-hand", "left-hand"] = ""
 
     @property
@@ -99,6 +104,26 @@ class Inertia(Data):
         if self.tensor_kgm2 is not None and len(self.tensor_kgm2) not in (3, 6):
             raise ValueError("three moments of inertia, or three and three products")
         return self
+
+
+class Hydrostatics(Data):
+    """Hydrostatic load that the loads contain, as two-phase CFD and balances without a zero reading have it.
+
+    Attributes
+    ----------
+    force_n : Upward force [N] of the tested body: its buoyancy, less what of its weight is in the loads.
+    centre_m : Where it acts, from the vehicle's origin, campaign frame, model scale.
+    attitude : ``level``: the body's z axis stays along gravity, the flow comes at an angle. ``pitched``:
+        the body is pitched by alpha, and gravity turns in its axes.
+    parts : Parts whose loads contain it.
+    source : Where the numbers come from.
+    """
+
+    force_n: Annotated[float, Field(ge=-1e12, le=1e12)]
+    centre_m: Vector
+    attitude: Literal["level", "pitched"]
+    parts: list[str] = Field(default_factory=lambda: ["hull"])
+    source: Annotated[str, Field(min_length=1, max_length=500)]
 
 
 class Tare(Data):
@@ -199,6 +224,7 @@ class CampaignFile(Data):
     quality: dict[str, Quality]
     tare: list[Tare] = Field(default_factory=list)
     half_model: HalfModel | None = None
+    hydrostatics: Hydrostatics | None = None
     tables: Tables = Field(default_factory=Tables)
     source: list[Source] = Field(default_factory=list)
 

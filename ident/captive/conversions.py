@@ -8,6 +8,8 @@ inertia is added back, half models are doubled, and Froude's law brings all to f
 
 from __future__ import annotations
 
+import math
+import re
 from functools import cache
 from importlib.resources import files
 
@@ -17,8 +19,10 @@ import pandas as pd
 from ident.captive.campaign_file import CampaignFile, Tare
 from ident.captive.quantities import PRIMED, TAKEN, factor
 from ident.captive.run_table import DIRECT, MOTION, excluded
+from ident.captive.source import Source
 from sim.boat.catalogue import ACCELERATIONS, OUTPUTS
 from sim.boat.forces import body_velocity
+from sim.boat.vehicle import Vehicle
 from sim.files.errors import InputError
 from sim.files.frames import Frame
 
@@ -29,6 +33,10 @@ _ASYMMETRIC = {
     "port_starboard": ("beta", "p", "r", "vdot", "pdot", "rdot"),
     "upper_lower": ("alpha", "p", "q", "wdot", "pdot", "qdot"),
 }
+# Rounding of a plane that is not deflected [rad].
+_AMIDSHIPS = 1e-6
+# A radius is printed with three digits or more.
+_SAME_RADIUS = 0.02
 # Flow beyond 60 deg from the axis is flow across the hull.
 _ACROSS = 0.5
 
@@ -40,7 +48,26 @@ def normalisations() -> pd.DataFrame:
         return pd.read_csv(stream, keep_default_na=False).set_index("name")
 
 
-def _product(text: str, values: dict[str, pd.Series | float]) -> pd.Series:
+def sizes(source: Source, header: CampaignFile, where: str) -> dict[str, float]:
+    """Sizes that a normalisation divides by: L, d, and A and l of ``[source.reference]``; 1 or NaN where not stated.
+
+    Raises
+    ------
+    InputError
+        For a normalisation by a stated area without one.
+    """
+    own = source.reference
+    if source.normalisation == "half_rho_A" and own is None:
+        raise InputError(where, "nothing", "a table [source.reference] with area_m2: half_rho_A needs it")
+    return {
+        "L": header.scale.length_m,
+        "d": header.scale.draught_m or 1.0,
+        "A": own.area_m2 if own else 1.0,
+        "l": (own.length_m or math.nan) if own else math.nan,
+    }
+
+
+def product(text: str, values: dict[str, pd.Series | float]) -> pd.Series:
     """``U U/L L`` of the table as a number a run."""
     over, _, under = text.partition("/")
     found: pd.Series = pd.Series(1.0, index=values["U"].index)  # type: ignore[union-attr]
@@ -51,14 +78,14 @@ def _product(text: str, values: dict[str, pd.Series | float]) -> pd.Series:
     return found
 
 
-def dimensional(runs: pd.DataFrame, primed: set[str], name: str, header: CampaignFile, where: str) -> pd.DataFrame:
+def dimensional(runs: pd.DataFrame, primed: set[str], source: Source, header: CampaignFile, where: str) -> pd.DataFrame:
     """Make dimensionless loads, rates and accelerations dimensional, at model scale.
 
     Parameters
     ----------
     runs : With U [m/s] in every run.
     primed : Quantities that are dimensionless, ``s_X`` and ``X_in`` among them.
-    name : A row of ``data/normalisations.csv``.
+    source : Its ``normalisation``, a row of ``data/normalisations.csv``, and ``reference``.
     header : For length, draught and density.
     where : For the error.
 
@@ -69,7 +96,7 @@ def dimensional(runs: pd.DataFrame, primed: set[str], name: str, header: Campaig
     """
     if not primed:
         return runs
-    table = normalisations()
+    table, name = normalisations(), source.normalisation
     if name not in table.index:
         found = repr(name) if name else f"{', '.join(sorted(primed))} dimensionless, and no normalisation"
         raise InputError(f"{where}, key source.normalisation", found, ", ".join(table.index))
@@ -84,12 +111,15 @@ def dimensional(runs: pd.DataFrame, primed: set[str], name: str, header: Campaig
         raise InputError(
             place, str(run.get("U")), f"a speed: dimensionless {', '.join(sorted(primed))} is made with it"
         )
-    values: dict[str, pd.Series | float] = {"U": speed, "L": header.scale.length_m, "d": header.scale.draught_m or 1.0}
+    values: dict[str, pd.Series | float] = {"U": speed, **sizes(source, header, f"{where}, key source.reference")}
     out = runs.copy()
     for quantity in sorted(primed):
         own = quantity.removeprefix("s_").split("_")[0]
         kind = PRIMED[own]
-        scale = _product(str(forms[kind]), values)
+        if "l" in re.split(r"[ /]", str(forms[kind])) and np.isnan(float(np.asarray(values["l"]))):
+            text = f"the length that {own} was made dimensionless with"
+            raise InputError(f"{where}, key source.reference.length_m", "nothing", text)
+        scale = product(str(forms[kind]), values)
         if own in OUTPUTS:
             scale = scale * 0.5 * header.fluid.density_kgpm3 * speed**2
         out[quantity] = out[quantity] * scale
@@ -105,6 +135,80 @@ def turn(runs: pd.DataFrame, frame: Frame, angles: str) -> pd.DataFrame:
     if angles == "ittc" and "beta" in turned:
         turned["beta"] = -turned["beta"]
     return turned
+
+
+def arm_rates(runs: pd.DataFrame, where: str) -> pd.DataFrame:
+    """Yaw rate of a rotating arm from its radius, r = U / R; one that is given as well has to agree.
+
+    Raises
+    ------
+    InputError
+        For a radius of zero, without speed, or with another yaw rate.
+    """
+    if "R0" not in runs or runs["R0"].isna().all():
+        return runs
+    out = runs.copy()
+    given = runs["R0"].notna()
+    speed = runs["U"] if "U" in runs else pd.Series(np.nan, index=runs.index)
+    bad = given & ~(runs["R0"].abs() > 0.0) | given & speed.isna()
+    if bad.any():
+        run = runs[bad].iloc[0]
+        text = "a radius beyond zero and a speed: r = U / R0 (a speed of zero is a pure rotation)"
+        raise InputError(f"{where}/{run['file']}, row {run['row']}, column R0", f"{run['R0']:g}", text)
+    rate = speed / runs["R0"]
+    # A rate that is given has its own axis: a model on its side turns in pitch or roll on the same arm.
+    rates = runs[[k for k in "pqr" if k in runs]]
+    turning = (rates**2).sum(axis=1, min_count=1) ** 0.5
+    off = given & turning.notna() & ((turning - rate.abs()).abs() > _SAME_RADIUS * rate.abs())
+    if off.any():
+        run = runs[off].iloc[0]
+        found = f"{run['R0']:g}, with which the rate is {rate[off].iloc[0]:g} rad/s and not {turning[off].iloc[0]:g}"
+        place = f"{where}/{run['file']}, row {run['row']}, column R0"
+        raise InputError(place, found, "a radius that fits speed and rate, or one of the two")
+    own = runs["r"] if "r" in runs else pd.Series(np.nan, index=runs.index)
+    out["r"] = own.where(turning.notna() | ~given, rate)
+    return out
+
+
+def deflected_left_out(runs: pd.DataFrame, vehicle: Vehicle) -> pd.DataFrame:
+    """Runs of a part that is no plane, with one deflected: their loads are excluded, with the reason.
+
+    No term of a hull depends on a plane's angle; with the plane at an angle its load is in the run and
+    would be taken for the hull's.
+    """
+    planes = [p.name for p in vehicle.planes]
+    turned = runs["plane"].fillna(0.0).abs() > _AMIDSHIPS
+    own = turned & ~runs["part"].isin(planes)
+    if not own.any():
+        return runs
+    out = runs.copy()
+    loads = [o for o in (*OUTPUTS, *DIRECT) if o in runs]
+    for i, run in runs[own].iterrows():
+        angle = math.degrees(run["plane"])
+        reason = f"a plane at {angle:g} deg: a run of the {run['part']} has them amidships"
+        out.loc[i, "exclude"] = " ".join(o for o in loads if pd.notna(run[o]))
+        out.loc[i, "reason"] = run["reason"] or reason
+    return out
+
+
+def without_hydrostatics(runs: pd.DataFrame, header: CampaignFile, frame: Frame) -> pd.DataFrame:
+    """Take the stated hydrostatic load off, about the vehicle's origin, in the program frame.
+
+    A force B upwards at r_B: F = -B g, M = r_B x F, with g the direction of gravity in the body,
+    (0, 0, 1) level and (-sin alpha, 0, cos alpha) pitched.
+    """
+    own = header.hydrostatics
+    if own is None:
+        return runs
+    chosen = runs["part"].isin(own.parts)
+    pitch = runs["alpha"].fillna(0.0).to_numpy(float) * (own.attitude == "pitched")
+    force = -own.force_n * np.stack([-np.sin(pitch), np.zeros(len(runs)), np.cos(pitch)], axis=1)
+    arm = np.broadcast_to(np.array(frame.vector(own.centre_m)), force.shape)
+    load = np.hstack([force, np.cross(arm, force)])
+    out = runs.copy()
+    for output, one in zip(OUTPUTS, load.T, strict=True):
+        out[output] = out[output] - np.where(chosen, one, 0.0)
+    return out
 
 
 def tare_applies(runs: pd.DataFrame, tare: Tare) -> pd.Series:

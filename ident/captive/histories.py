@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +16,8 @@ from ident.captive.source import MOTIONS, Reduction
 from ident.timeseries import blocks as condense
 from ident.timeseries import reduction
 from ident.timeseries.clock import Clock
+from ident.timeseries.faults import Usual, usual
+from ident.timeseries.frequency import Line, estimate
 from sim.boat.catalogue import OUTPUTS
 from sim.boat.forces import body_velocity
 from sim.files.errors import InputError
@@ -23,11 +25,20 @@ from sim.files.frames import Frame
 
 Array = NDArray[np.float64]
 Pieces = Callable[[], Iterator[Array]]
+# (time, values, displacement at each sample) -> values along the body's axes, about its moving point.
+Moving = Callable[[Array, Array, Array], Array]
 
 # The four states of an oscillation: name, phase of the displacement A sin(theta).
 PHASES = {"+v": 0.0, "-v": math.pi, "+a": math.pi / 2, "-a": 3 * math.pi / 2}
 # Amplitudes of rate and acceleration in a table are printed with three digits or more.
 _AGREE = 0.02
+# A stated frequency that is off by more than this part of itself is another test's; one that the record
+# contradicts by so many standard errors, and by so many cycles from end to end, is replaced by the record's.
+_OFF = 0.05
+_SURE = 4.0
+_DRIFT = 2e-3
+# A clock that starts later than so many steps does not start with the motion.
+_LATE = 1.5
 # Test whose terms a state at the end of the velocity identifies.
 _STEADY_TEST = {"surge": "towing", "sway": "drift_horizontal", "heave": "drift_vertical"}
 
@@ -42,12 +53,16 @@ class Channels:
     quantities : ``time`` (unless a rate is stated), loads, and measured states.
     pieces : Starts reading; blocks (rows, channels) in SI.
     first_row : File row of the first sample.
+    missing : Channel -> stated values that stand for "nothing measured", in SI.
+    moving : Turns loads and moves moments of a body that moves in their axes.
     """
 
     path: Path
     quantities: list[str]
     pieces: Pieces
     first_row: int = 2
+    missing: dict[str, tuple[float, ...]] = field(default_factory=dict)
+    moving: Moving | None = None
 
 
 class NotRising(InputError):
@@ -81,6 +96,11 @@ class Reduced:
     clock : Its time stamps; None where the file has none.
     rate_hz : Sampling rate that stands in for them.
     first_row : File row of the first stamp.
+    left_out : (kind, channel) -> samples that were no measurements, see ``ident.timeseries.faults``.
+    clipped : Channel -> how it is clipped.
+    samples : All of them, in the window.
+    stated_hz : Frequency of an oscillation as stated, where the record's own was used instead.
+    line : Frequency found in the record.
     """
 
     run_id: str
@@ -91,6 +111,11 @@ class Reduced:
     clock: Clock | None = None
     rate_hz: float | None = None
     first_row: int = 2
+    left_out: dict[tuple[str, str], int] = field(default_factory=dict)
+    clipped: dict[str, str] = field(default_factory=dict)
+    samples: int = 0
+    stated_hz: float | None = None
+    line: Line | None = None
 
     @property
     def runs(self) -> list[str]:
@@ -101,10 +126,25 @@ class Reduced:
         """The reduction in one line, as the run table carries it."""
         cut = f"{reduction.TRANSIENT} cut to" if self.fit.cut else "window"
         fewest = self.fit.effective.min() if self.fit.effective.size else math.nan
+        more = "".join(f"; {text}" for text in self.remarks())
         return (
             f"{self.kind}, {cut} {self.fit.start:g}-{self.fit.end:g} s, s.e. {reduction.ERROR}, "
-            f"{fewest:.0f} effective samples, {self.fit.verdict}"
+            f"{fewest:.0f} effective samples, {self.fit.verdict}{more}"
         )
+
+    def remarks(self) -> list[str]:
+        """What was left out of the record, and what of it is not as stated."""
+        texts = [f"{n} {kind} samples of {name} left out" for (kind, name), n in self.left_out.items()]
+        texts += [f"{name} is clipped: {text}" for name, text in self.clipped.items()]
+        if self.stated_hz is not None and self.line is not None:
+            texts.append(
+                f"{self.stated_hz:g} Hz stated, the record oscillates at {self.line.frequency:.6g} +- "
+                f"{self.line.stderr:.1g} Hz, which is used"
+            )
+        return texts
+
+
+Timed = Iterator[tuple[Array, Array, NDArray[np.bool_]]]
 
 
 def _timed(channels: Channels, rule: Reduction, clock: Clock | None = None) -> Iterator[tuple[Array, Array]]:
@@ -172,9 +212,16 @@ def reduce(channels: Channels, rule: Reduction, run_id: str, frequency: float | 
     if "time" not in channels.quantities and rule.rate_hz is None:
         text = "a column time, or rate_hz in [source.reduction]"
         raise InputError(str(channels.path), "no time", text)
-    regressors, span = _regressors(channels, rule, frequency)
+    sound, faults = _sound(channels, rule, names)
+    line, stated = None, None
+    if rule.kind == "oscillatory":
+        line = _line(sound(None), names, frequency, channels)
+        frequency, stated = _frequency(line, frequency, names, rule, channels)
+        _phase_is_known(channels, rule, names)
+    regressors, span = _regressors(channels, rule, frequency, sound)
     clock = Clock() if "time" in channels.quantities else None
-    condensed = condense.condense(_timed(channels, rule, clock), regressors, len(names))
+    faults.counts.clear()
+    condensed = condense.condense(_moved(sound(clock), channels, names, rule, frequency), regressors, len(names))
     try:
         fit = reduction.fit_history(condensed, names)
     except (ValueError, np.linalg.LinAlgError) as error:
@@ -182,9 +229,10 @@ def reduce(channels: Channels, rule: Reduction, run_id: str, frequency: float | 
         text = f"samples enough for a {rule.kind} fit{window}"
         raise InputError(str(channels.path), f"{error} in {condensed.samples} rows", text) from error
     own = (clock, rule.rate_hz, channels.first_row)
-    reduced = Reduced(run_id, channels.path.name, names, rule.kind, fit, *own)
+    left = (dict(faults.counts), faults.clipped, condensed.samples + sum(faults.counts.values()), stated, line)
+    reduced = Reduced(run_id, channels.path.name, names, rule.kind, fit, *own, *left)
     if rule.kind == "oscillatory":
-        return _harmonic_values(names, fit, frequency or 0.0), reduced
+        return _harmonic_values(names, fit, frequency or 0.0, rule.delay_s), reduced
     values: dict[str, Any] = {}
     for c, name in enumerate(names):
         values[name] = float(fit.values[0, c])
@@ -195,16 +243,92 @@ def reduce(channels: Channels, rule: Reduction, run_id: str, frequency: float | 
     return values, reduced
 
 
-def _regressors(channels: Channels, rule: Reduction, frequency: float | None) -> tuple[condense.Regressors, float]:
+def _sound(channels: Channels, rule: Reduction, names: list[str]) -> tuple[Callable[[Clock | None], Timed], Usual]:
+    """The history with the samples marked that are no measurements, and what its channels are like."""
+    missing = [channels.missing.get(name, ()) for name in names]
+    found = usual((values for _, values in _timed(channels, rule)), names, missing)
+    return (lambda clock: found.faults(_timed(channels, rule, clock))), found
+
+
+def _line(pieces: Timed, names: list[str], frequency: float | None, channels: Channels) -> Line | None:
+    """The oscillation of the displacement, or else of the loads."""
+    condensed = condense.condense(pieces, condense.constant, len(names))
+    weight, time, _, values = condensed.blocks()
+    chosen = (
+        [names.index("displacement")]
+        if "displacement" in names
+        else [c for c, name in enumerate(names) if name in OUTPUTS]
+    )
+    if frequency is None and "displacement" not in names:
+        raise InputError(str(channels.path), "no frequency", "frequency_hz in [source.reduction], or frequency")
+    found = estimate(time, values[:, chosen], weight, frequency) if time.size else None
+    return None if found is None else replace(found, channel=chosen[found.channel])
+
+
+def _frequency(
+    line: Line | None, stated: float | None, names: list[str], rule: Reduction, channels: Channels
+) -> tuple[float, float | None]:
+    """The frequency to use, and the stated one where the record says another."""
+    if stated is None or not stated > 0.0:
+        if line is None:
+            text = "frequency_hz in [source.reduction], or frequency; the displacement holds no clear oscillation"
+            raise InputError(str(channels.path), "no frequency", text)
+        return line.frequency, None
+    if line is None:
+        return stated, None
+    off = abs(line.frequency - stated)
+    if off > _OFF * stated:
+        found = f"frequency_hz = {stated:g}, and {names[line.channel]} oscillates at {line.frequency:.5g} Hz"
+        raise InputError(str(channels.path), found, f"the frequency of the motion, to {100 * _OFF:g} %")
+    drift = off * _span(channels, rule)
+    return (line.frequency, stated) if off > _SURE * line.stderr and drift > _DRIFT else (stated, None)
+
+
+def _span(channels: Channels, rule: Reduction) -> float:
+    first, last = math.inf, -math.inf
+    for time, _ in _timed(channels, rule):
+        first, last = min(first, float(time[0])), float(time[-1])
+    return last - first
+
+
+def _phase_is_known(channels: Channels, rule: Reduction, names: list[str]) -> None:
+    """A phase that is not stated is that of a clock that starts at zero, or a channel's."""
+    if "displacement" in names or "phase_deg" in rule.model_fields_set or rule.rate_hz is not None:
+        return
+    time = next((time for time, _ in _timed(channels, rule.model_copy(update={"start_s": None}))), np.zeros(0))
+    if time.size > 1 and abs(time[0]) > _LATE * abs(time[1] - time[0]):
+        text = "phase_deg in [source.reduction]: that of the displacement at time zero of this clock "
+        text += "(phase_deg = 0.0 where it is zero), or a column displacement"
+        raise InputError(str(channels.path), f"a clock that starts at {time[0]:g} s, and no phase", text)
+
+
+def _moved(pieces: Timed, channels: Channels, names: list[str], rule: Reduction, frequency: float | None) -> Timed:
+    """Loads of a body that moves in their axes: turned with it, moments about its own point."""
+    for time, values, bad in pieces:
+        if channels.moving is None:
+            yield time, values, bad
+            continue
+        if "displacement" in names:
+            at = values[:, names.index("displacement")]
+        elif rule.amplitude is not None and frequency:
+            at = rule.amplitude * np.sin(2.0 * math.pi * frequency * time + math.radians(rule.phase_deg))
+        else:
+            text = "amplitude in [source.reduction], or a column displacement: the body moves in the axes of the loads"
+            raise InputError(str(channels.path), "no displacement", text)
+        yield time, channels.moving(time, values, at), bad
+
+
+def _regressors(
+    channels: Channels, rule: Reduction, frequency: float | None, sound: Callable[[Clock | None], Timed]
+) -> tuple[condense.Regressors, float]:
     """What the channels of a test are fitted by, and the unit of its time [s]."""
     if rule.kind == "steady":
         return condense.constant, 1.0
     if rule.kind == "oscillatory":
-        if not frequency:
-            raise InputError(str(channels.path), "no frequency", "frequency_hz in [source.reduction], or frequency")
+        assert frequency is not None
         return condense.harmonics(frequency, math.radians(rule.phase_deg)), 1.0
     first, last = math.inf, -math.inf
-    for time, _ in _timed(channels, rule):
+    for time, _, _ in sound(None):
         first, last = min(first, float(time[0])), float(time[-1])
     if not last > first:
         raise InputError(str(channels.path), "no span of time", "samples over a span of time")
@@ -212,19 +336,25 @@ def _regressors(channels: Channels, rule: Reduction, frequency: float | None) ->
     return condense.powers(first + half, half), half
 
 
-def _harmonic_values(names: list[str], fit: reduction.Fitted, frequency: float) -> dict[str, Any]:
-    """Harmonics in the phase of the displacement, which a channel may measure."""
+def _harmonic_values(
+    names: list[str], fit: reduction.Fitted, frequency: float, delay_s: dict[str, float]
+) -> dict[str, Any]:
+    """Harmonics in the phase of the displacement, which a channel may measure, each channel's delay taken off."""
     shift, values = 0.0, {}
+    omega = 2.0 * math.pi * frequency
     if "displacement" in names:
         s, c = fit.values[1:3, names.index("displacement")]
-        shift = math.atan2(c, s)
+        shift = math.atan2(c, s) + omega * delay_s.get("displacement", 0.0)
         values["amplitude"] = math.hypot(s, c)
-    turn = np.eye(7)
-    for k in (1, 2, 3):
-        a = k * shift
-        turn[2 * k - 1 : 2 * k + 1, 2 * k - 1 : 2 * k + 1] = [[math.cos(a), math.sin(a)], [-math.sin(a), math.cos(a)]]
     covariance = {}
     for c_, name in enumerate(names):
+        # What comes late by a delay stands a phase of omega times it behind.
+        late = omega * delay_s.get(name.removeprefix(TAKEN), 0.0)
+        turn = np.eye(7)
+        for k in (1, 2, 3):
+            a = k * (shift - late)
+            block = [[math.cos(a), math.sin(a)], [-math.sin(a), math.cos(a)]]
+            turn[2 * k - 1 : 2 * k + 1, 2 * k - 1 : 2 * k + 1] = block
         own = turn @ fit.values[:, c_]
         if name.removeprefix(TAKEN) in OUTPUTS:
             values |= {f"{name}_{h}": float(v) for h, v in zip(HARMONICS, own, strict=True)}

@@ -34,8 +34,22 @@ PRIMED = {
 }
 _BRACKET = re.compile(r"^(?P<name>.*?)\s*(?:\[(?P<square>[^\[\]]*)\]|\((?P<round>[^()]*)\))$", re.DOTALL)
 _PART = re.compile(r"([A-Za-zµ]+)(?:(?:\*\*|\^)?(-?[1-4]))?")
-_RAISED = str.maketrans("⁻¹²³⁴", "-1234")
+_RAISED = str.maketrans("⁻⁺⁰¹²³⁴⁵⁶⁷⁸⁹", "-+0123456789")
+# A unit with a power of ten before it: 10^3 N, 1e3 N, 10³ N.
+_POWER = re.compile(
+    r"(?:10\s*(?:\^|\*\*)\s*(?P<a>[-+]?\d)|1[eE](?P<b>[-+]?\d)|10(?P<c>[⁻⁺]?[⁰¹²³⁴⁵⁶⁷⁸⁹]))"
+    r"\s*[*·x× ]?\s*(?P<unit>[^\d\s].*)"
+)
+# A unit after a slash or a comma, as DIN 1313 and some loggers write it: F_y / kN; Fy, kN.
+_AFTER = re.compile(r"^(?P<name>.*\S)(?:\s+/\s+|\s*,\s+)(?P<unit>\S.*)$")
 _ANGLES = {"radian", "degree", "turn", "grade", "arcminute", "arcsecond", "milliradian"}
+# Coefficients that are printed times ten, and headers that say so: 10KQ, 10 Kq, X' x1000, CT*10^3.
+_BARE = ("KT", "KQ", "J", "t")
+_MULTIPLE = re.compile(r"(?P<times>10{1,6})\s*[*·]?\s*(?P<name>[A-Za-z]+)")
+_TIMES = re.compile(
+    r"(?i)(^|\s|\()1(0{1,6}|e[+-]?\d)\s*[*·x]?\s*[a-z]{1,2}(?![a-z])"
+    r"|[x×*·]\s*(10{1,6}|10\s*(\^|\*\*|e)\s*[-+]?\d+|1e[+-]?\d+)\b"
+)
 _NO_UNIT = ("", "-", "1", "/")
 
 
@@ -49,12 +63,14 @@ class Column:
     quantity : Name in the run table: ``U``, ``X``, ``s_X``, ``X_in``, ...
     factor : Factor to SI (rad, rev/s); 1 for dimensionless input.
     primed : True for a dimensionless load, rate or acceleration.
+    unit : Of a published ``value``, which its coefficient decides the dimension of; empty for prime form.
     """
 
     name: str
     quantity: str
     factor: float
     primed: bool = False
+    unit: str = ""
 
 
 @cache
@@ -71,6 +87,14 @@ def units() -> dict[str, dict[str, float]]:
     for q, unit, factor in zip(table()["quantity"], table()["unit"], table()["factor"], strict=True):
         known.setdefault(str(q), {})[str(unit)] = float(factor)
     return known
+
+
+@cache
+def _other_spellings() -> dict[str, str]:
+    """Units as laboratories write them -> as this program and pint do, from ``data/unit_spellings.csv``."""
+    with (files("ident") / "data" / "unit_spellings.csv").open(encoding="utf-8") as stream:
+        rows = pd.read_csv(stream, keep_default_na=False)
+    return dict(zip(rows["spelled"], rows["means"], strict=True))
 
 
 @cache
@@ -106,6 +130,9 @@ def split(header: str) -> tuple[str, str | None]:
     """A header as name and unit in brackets; the unit is None when there are no brackets."""
     found = _BRACKET.match(header.strip())
     if not found:
+        after = _AFTER.match(header.strip())
+        if after and is_unit(after["unit"].strip()):
+            return after["name"].strip(), after["unit"].strip()
         return header.strip(), None
     unit = found["square"] if found["square"] is not None else found["round"]
     return found["name"].strip(), unit.strip()
@@ -144,6 +171,13 @@ def factor(quantity: str, unit: str) -> float | None:
     choices = units()[quantity]
     if unit in choices:
         return choices[unit]
+    if (power := _POWER.fullmatch(unit)) is not None:
+        own = factor(quantity, power["unit"])
+        ten = (power["a"] or power["b"] or power["c"].translate(_RAISED)) if own is not None else ""
+        return None if own is None or not -9 <= int(ten) <= 9 else own * 10.0 ** int(ten)
+    spelled = _other_spellings().get(unit)
+    if spelled is not None and (own := factor(quantity, spelled)) is not None:
+        return own
     if unit in _NO_UNIT or quantity not in _spelled() or len(unit) > 40:
         return choices.get("") if unit in _NO_UNIT else None
     text = _clean(unit)
@@ -163,6 +197,33 @@ def factor(quantity: str, unit: str) -> float | None:
         return float(registry.Quantity(1.0, given).to(wanted).magnitude)
     except (pint.errors.PintError, ValueError, TypeError, AttributeError, ArithmeticError):
         return None
+
+
+def powers_of(unit: str) -> tuple[float, float, float, float, int] | None:
+    """A unit as factor to SI and radians, powers of kilogram, metre and second, and power of an angle.
+
+    Returns
+    -------
+    None for what is no unit, or one with other dimensions.
+    """
+    text = _clean(unit) if len(unit) <= 40 else None
+    if text is None:
+        return None
+    import pint
+
+    registry = _registry()
+    try:
+        given = registry.parse_units(text)
+        made = registry.Quantity(1.0, given).to_base_units()
+    except (pint.errors.PintError, ValueError, TypeError, AttributeError, ArithmeticError):
+        return None
+    own = {str(u): float(p) for u, p in dict(given._units).items()}
+    angle = round(sum(p for u, p in own.items() if u in _ANGLES))
+    base = {str(k): float(v) for k, v in dict(made.dimensionality).items()}
+    known = {"[mass]", "[length]", "[time]"}
+    if set(base) - known:
+        return None
+    return (float(made.magnitude), base.get("[mass]", 0.0), base.get("[length]", 0.0), base.get("[time]", 0.0), angle)
 
 
 @cache
@@ -191,8 +252,10 @@ def _contradiction(quantity: str, header: str, unit: str, place: str) -> None:
 
 def is_unit(text: str) -> bool:
     """Whether some quantity has this unit, or pint knows it, capitals or not."""
-    if text in _NO_UNIT or any(text in choices for choices in units().values()):
+    if text in _NO_UNIT or text in _other_spellings() or any(text in choices for choices in units().values()):
         return True
+    if (power := _POWER.fullmatch(text)) is not None:
+        return is_unit(power["unit"])
     import pint
 
     cleaned = _clean(text) if len(text) <= 40 else None
@@ -202,7 +265,7 @@ def is_unit(text: str) -> bool:
         return False
 
 
-def column(header: str, declared: str | None, where: str) -> Column:
+def column(header: str, declared: str | None, where: str, factored: bool = False) -> Column:
     """What a column is, from its header and what the campaign declares it to be.
 
     Parameters
@@ -210,15 +273,23 @@ def column(header: str, declared: str | None, where: str) -> Column:
     header : As it stands in the file: ``U_kts``, ``Fx [kN]``, ``N'``.
     declared : ``X`` or ``X [kN]`` from ``[source.columns]``; None to read the header itself.
     where : File and row, for the error.
+    factored : Whether ``[source.factor]`` names the column.
 
     Raises
     ------
     InputError
-        For an unknown quantity, or a wrong, missing or contradicting unit.
+        For an unknown quantity, a header that names a multiple without a stated factor, or a
+        wrong, missing or contradicting unit.
     """
     if declared is None and header in suffixed():
         return Column(header, *suffixed()[header])
     place = f"{where}, column {header[:60]!r}"
+    if declared is None and (times := _MULTIPLE.fullmatch(header)) and owner(times["name"]) in _BARE:
+        # A header 10KQ holds ten times KQ.
+        return Column(header, times["name"], 1.0 / float(times["times"]))
+    if _TIMES.search(header) and not factored:
+        text = "a factor in [source.factor]: what a value is multiplied by to give the quantity"
+        raise InputError(place, "a header that names a multiple", text)
     if declared is not None and declared in suffixed():
         quantity, scale = suffixed()[declared]
         if owner(quantity) != declared or "" in units()[owner(quantity)]:
@@ -243,6 +314,8 @@ def column(header: str, declared: str | None, where: str) -> Column:
         return Column(header, quantity, 1.0, primed=True)
     if unit is None and "" not in units()[known]:
         raise InputError(place, f"no unit for {name}", allowed_units(known))
+    if known == "value" and unit is not None and unit not in _NO_UNIT:
+        return Column(header, quantity, 1.0, unit=unit)
     scale_to_si = factor(known, unit or "")
     if scale_to_si is None:
         raise InputError(place, f"unit {unit!r} for {name}", allowed_units(known))

@@ -14,15 +14,17 @@ import pandas as pd
 
 from ident.captive.campaign_file import CampaignFile
 from ident.captive.conversions import dimensional, quantity_of
-from ident.captive.histories import Channels, NotRising, Pieces, Reduced, reduce, states
+from ident.captive.histories import Channels, Moving, NotRising, Pieces, Reduced, reduce, states
+from ident.captive.moving import axes_of, moving_body, refuse_tables
 from ident.captive.quantities import Column, column, owner, suffixed
 from ident.captive.readers import openfoam
 from ident.captive.readers.opening import matching, open_sheet, reader_of
 from ident.captive.readers.table import Sheet, columns_of, run_blocks
 from ident.captive.readers.text import LARGEST, Dialect
 from ident.captive.run_table import DIRECT, REQUIRED, STATES, TEXT
-from ident.captive.source import NO_COLUMNS, Source
+from ident.captive.source import NO_COLUMNS, Reduction, Source, idle_keys
 from ident.captive.subtract import off_samples, off_table, taken_columns
+from ident.captive.uses import Uses, refuse_idle_quantities
 from ident.output import Tell, silent
 from sim.boat.catalogue import OUTPUTS
 from sim.files.errors import InputError
@@ -76,22 +78,32 @@ def source_runs(
     paths = matching(folder, source)
     where = str(folder / "campaign.toml")
     tables: list[pd.DataFrame] = []
+    uses = Uses(source, where)
     for done, path in enumerate(paths):
         tell(f"reading {source.files}", done, len(paths))
+        idle = idle_keys(source, reader_of(path, source))
+        if idle:
+            text = f"nothing: the reader {reader_of(path, source)} of {path.name} does not look at it"
+            raise InputError(f"{where}, key source.{idle[0]}", "declared", text)
         stated = constants(folder, path, source)
         name = path.relative_to(folder).as_posix()
         try:
             if source.rows == "history":
-                table, reduced = _from_histories(path, source, header, stated, where)
+                table, reduced = _from_histories(path, source, header, stated, where, uses)
                 found.reduced += [replace(one, file=name) for one in reduced]
             else:
-                table = _from_table(path, source, header, stated, where)
+                table = _from_table(path, source, header, stated, where, uses)
         except NotRising as error:
             # Every such file is to be named, not the first alone.
             error.file = name
             found.refused.append(error)
             continue
-        tables.append(outside_excluded(table.assign(file=name), source, where))
+        turned = source.reduction is not None and source.reduction.kind == "oscillatory"
+        table = table.assign(file=name, files=source.files, axes="body" if turned else axes_of(source, header))
+        refuse_idle_quantities(table)
+        tables.append(outside_excluded(table, source, where))
+    if paths and not found.refused:
+        uses.refuse()
     tell(f"reading {source.files}", len(paths), len(paths))
     found.tables += tables
     found.inputs += paths
@@ -185,13 +197,17 @@ def constants(folder: Path, path: Path, source: Source) -> tuple[dict[str, str],
 Stated = tuple[dict[str, str], dict[str, float], set[str]]
 
 
-def _from_table(path: Path, source: Source, header: CampaignFile, stated: Stated, where: str) -> pd.DataFrame:
+def _from_table(
+    path: Path, source: Source, header: CampaignFile, stated: Stated, where: str, uses: Uses
+) -> pd.DataFrame:
     """A table with a row a run."""
     words, numbers, primed = stated
     sheet = open_sheet(path, source)
+    kinds = columns_of(sheet, source, TEXT)
+    uses.columns(sheet.header, kinds)
     wanted: list[tuple[int, Column | None]] = []
     names: list[str] = []
-    for at, (name, kind) in enumerate(zip(sheet.header, columns_of(sheet, source, TEXT), strict=True)):
+    for at, (name, kind) in enumerate(zip(sheet.header, kinds, strict=True)):
         text = source.columns.get(name, name)
         if kind is not None or text in TEXT:
             wanted.append((at, kind))
@@ -202,7 +218,10 @@ def _from_table(path: Path, source: Source, header: CampaignFile, stated: Stated
     _required(sheet, {*names, *words, *numbers}, source)
     totals = {q for q in (*names, *numbers) if owner(q) in OUTPUTS and not q.startswith(("s_", "sigma_"))}
     taken = taken_columns(sheet, source, header, totals, where) if source.subtract else []
-    cells, rows = _cells(sheet, wanted + [(t.at, t.kind) for t in taken])
+    cells, rows = _cells(sheet, wanted + [(t.at, t.kind) for t in taken], source.missing)
+    cells = [
+        uses.translated(c, names[i]) if i < len(wanted) and wanted[i][1] is None else c for i, c in enumerate(cells)
+    ]
     columns: dict[str, Any] = dict(zip(names, cells, strict=False)) | {**words, **numbers}
     primed = primed | {kind.quantity for _, kind in wanted if kind is not None and kind.primed}
     if "run_id" not in columns:
@@ -211,20 +230,37 @@ def _from_table(path: Path, source: Source, header: CampaignFile, stated: Stated
     for name in TEXT:
         columns.setdefault(name, "")
     out = pd.DataFrame({**columns, "file": path.name, "row": rows, "reduction": ""}, index=range(len(rows)))
-    out = dimensional(out, primed, source.normalisation, header, where)
+    uses.primed |= primed | ({"value"} if "value" in columns else set())
+    out = dimensional(out, primed, source, header, where)
+    if "value" in columns:
+        out["value_unit"] = next((k.unit for k in kinds if k is not None and k.quantity == "value"), "")
+        out["normalisation"], out["reference_area"], out["reference_length"] = _of_values(source)
     if taken:
+        uses.primed |= {t.kind.quantity for t in taken if t.kind.primed}
         off = pd.DataFrame(dict(enumerate(cells[len(wanted) :])))
         out = off_table(out, taken, off, source, header, sheet)
-    return _spread(out, source, header, str(path)) if source.reduction else out
+    if source.reduction is None:
+        return out
+    standing = any(out[k].fillna(0.0).ne(0.0).any() for k in ("alpha", "beta") if k in out)
+    refuse_tables(source, header, standing, where)
+    return _spread(out, source, header, str(path))
 
 
-def _cells(sheet: Sheet, wanted: list[tuple[int, Column | None]]) -> tuple[list[np.ndarray], np.ndarray]:
+def _of_values(source: Source) -> tuple[str, float, float]:
+    """How published values of a source were made dimensionless: name, area and length [SI] where stated."""
+    own = source.reference
+    return source.normalisation, own.area_m2 if own else np.nan, (own.length_m or np.nan) if own else np.nan
+
+
+def _cells(
+    sheet: Sheet, wanted: list[tuple[int, Column | None]], missing: Sequence[float]
+) -> tuple[list[np.ndarray], np.ndarray]:
     """Columns of a run table, each as numbers in SI or, without a kind, as text; and the file rows."""
     found: list[list[np.ndarray]] = [[] for _ in wanted]
     places = []
     for rows, cells in run_blocks(sheet):
         for parts, (at, kind) in zip(found, wanted, strict=True):
-            parts.append(_words(cells[at]) if kind is None else _numbers(sheet, cells[at], rows, kind))
+            parts.append(_words(cells[at]) if kind is None else _numbers(sheet, cells[at], rows, kind, missing))
         places.append(np.array(rows))
     return [np.concatenate(parts) for parts in found], np.concatenate(places)
 
@@ -244,12 +280,12 @@ def _required(sheet: Sheet, columns: set[str], source: Source) -> None:
             raise InputError(str(sheet.path), f"column {name} missing", text)
 
 
-def _numbers(sheet: Sheet, cells: Sequence[str], rows: list[int], kind: Column) -> np.ndarray:
-    """A column of a run table as numbers; blank is NaN."""
+def _numbers(sheet: Sheet, cells: Sequence[str], rows: list[int], kind: Column, missing: Sequence[float]) -> np.ndarray:
+    """A column of a run table as numbers; blank, or stated to be missing, is NaN."""
     signless = kind.quantity.startswith("s_") or kind.quantity == "rel_sigma"
     plain = _plain_numbers(cells) if (sheet.dialect.decimal, sheet.dialect.thousands) == (".", "") else None
     if plain is not None and not (signless and (plain < 0.0).any()):
-        return plain * kind.factor
+        return np.where(np.isin(plain, list(missing)), np.nan, plain * kind.factor) if missing else plain * kind.factor
     values = np.full(len(cells), np.nan)
     for i, cell in enumerate(cells):
         if not cell.strip():
@@ -260,7 +296,7 @@ def _numbers(sheet: Sheet, cells: Sequence[str], rows: list[int], kind: Column) 
             raise InputError(place, repr(cell[:60]), f"a finite number of at most {LARGEST:g}, or blank")
         if value < 0.0 and signless:
             raise InputError(f"{sheet.path}, row {rows[i]}, column {kind.name[:60]}", cell[:60], "zero or more")
-        values[i] = value * kind.factor
+        values[i] = np.nan if value in missing else value * kind.factor
     return values
 
 
@@ -287,7 +323,7 @@ def _spread(table: pd.DataFrame, source: Source, header: CampaignFile, where: st
 
 
 def _from_histories(
-    path: Path, source: Source, header: CampaignFile, stated: Stated, where: str
+    path: Path, source: Source, header: CampaignFile, stated: Stated, where: str, uses: Uses
 ) -> tuple[pd.DataFrame, list[Reduced]]:
     """A file or case that is one history a part."""
     assert source.reduction is not None
@@ -295,17 +331,21 @@ def _from_histories(
     rule = source.reduction
     if primed:
         one_run = pd.DataFrame([{**numbers, "file": path.name, "row": 1}])
-        made = dimensional(one_run, primed, source.normalisation, header, where).iloc[0]
+        made = dimensional(one_run, primed, source, header, where).iloc[0]
+        uses.primed |= primed
         numbers = {k: float(made[k]) for k in numbers}
     frame, ittc = header.frame.frame, header.frame.angles == "ittc"
     rows: list[dict[str, Any]] = []
     reduced = []
-    for part, channels in _channels(path, source, header, numbers, where):
+    for part, channels in _channels(path, source, header, numbers, where, uses):
         own = dict(words) | ({"part": part} if part else {})
         # Of a folder "drift_2.5" all is its name.
         name = own.get("run_id") or (path.name if path.is_dir() else path.stem)
         own["run_id"] = f"{name}-{part}" if part else name
+        if "frequency" in numbers and rule.frequency_hz is not None:
+            raise InputError(f"{where}, key source.reduction.frequency_hz", "frequency stated twice", "one of the two")
         frequency = numbers.get("frequency", rule.frequency_hz)
+        _no_idle_rule(channels, rule, where)
         values, one = reduce(channels, rule, own["run_id"], frequency)
         for quantity in values:
             if quantity in numbers and quantity != "frequency":
@@ -324,16 +364,19 @@ def _from_histories(
 
 
 def _channels(
-    path: Path, source: Source, header: CampaignFile, numbers: dict[str, float], where: str
+    path: Path, source: Source, header: CampaignFile, numbers: dict[str, float], where: str, uses: Uses
 ) -> Iterator[tuple[str, Channels]]:
     """The histories of a path: part (empty where the campaign names it) and channels."""
     if reader_of(path, source) == "openfoam":
         if source.subtract:
             raise InputError(f"{where}, key source.subtract", "an OpenFOAM case", NO_COLUMNS)
-        yield from _openfoam(path, source, header, where)
+        uses.whole()
+        yield from _openfoam(path, source, header, numbers, where)
         return
     sheet = open_sheet(path, source)
-    wanted = [(i, k) for i, k in enumerate(columns_of(sheet, source, ())) if k is not None]
+    kinds = columns_of(sheet, source, ())
+    uses.columns(sheet.header, kinds)
+    wanted = [(i, k) for i, k in enumerate(kinds) if k is not None]
     if not wanted:
         raise InputError(sheet.where, "no column that is a quantity", "time and loads")
     names = [k.quantity for _, k in wanted]
@@ -343,7 +386,8 @@ def _channels(
         if not kind.primed:
             return kind.factor
         one = pd.DataFrame([{kind.quantity: 1.0, "U": numbers.get("U"), "file": path.name, "row": 1}])
-        made = dimensional(one, {kind.quantity}, source.normalisation, header, where).iloc[0]
+        uses.primed.add(kind.quantity)
+        made = dimensional(one, {kind.quantity}, source, header, where).iloc[0]
         return float(made[kind.quantity]) * kind.factor
 
     factors = np.array([to_si(kind) for kind in (*(k for _, k in wanted), *(t.kind for t in taken))])
@@ -353,10 +397,28 @@ def _channels(
         for block in sheet.numbers([*(i for i, _ in wanted), *(t.at for t in taken)]):
             yield block @ matrix if taken else block * factors
 
-    yield "", Channels(path, channels, pieces, sheet.first_row)
+    gaps = {k.quantity: tuple(m * f for m in source.missing) for (_, k), f in zip(wanted, factors, strict=False)}
+    others = [c for c in channels if c != "time"]
+    moving = moving_body(others, source, header, numbers, source.moments_about or "body", where)
+    yield "", Channels(path, channels, pieces, sheet.first_row, gaps, moving)
 
 
-def _openfoam(path: Path, source: Source, header: CampaignFile, where: str) -> Iterator[tuple[str, Channels]]:
+def _no_idle_rule(channels: Channels, rule: Reduction, where: str) -> None:
+    """Refuse keys of an oscillation that a channel of the record stands in for."""
+    place = f"{where}, key source.reduction."
+    if "displacement" in channels.quantities:
+        for key in ("amplitude", "phase_deg"):
+            if key in rule.model_fields_set:
+                text = "nothing: the column displacement measures it"
+                raise InputError(place + key, "declared", text)
+    for name in rule.delay_s:
+        if name not in channels.quantities or name == "time":
+            raise InputError(f"{place}delay_s.{name}", "no such channel", ", ".join(channels.quantities))
+
+
+def _openfoam(
+    path: Path, source: Source, header: CampaignFile, numbers: dict[str, float], where: str
+) -> Iterator[tuple[str, Channels]]:
     """The function objects of an OpenFOAM case, each the history of one part."""
     if source.rho_inf is None:
         text = "the rhoInf of the function object: 1 for kinematic loads, or the density it used"
@@ -384,18 +446,44 @@ def _openfoam(path: Path, source: Source, header: CampaignFile, where: str) -> I
         text = f"[source.parts] naming the part of each: {', '.join(found)}"
         raise InputError(str(path), f"{len(found)} function objects", text)
     for name, part in chosen.items():
-        yield part, Channels(path, ["time", *openfoam.LOADS], _foam_pieces(found[name], source, header))
+        pieces = _foam_pieces(found[name], source, header, where)
+        moving = _foam_moving(found[name], source, header, numbers, where)
+        yield part, Channels(path, ["time", *openfoam.LOADS], pieces, moving=moving)
 
 
-def _foam_pieces(folder: Path, source: Source, header: CampaignFile) -> Pieces:
+def _foam_moving(
+    folder: Path, source: Source, header: CampaignFile, numbers: dict[str, float], where: str
+) -> Moving | None:
+    """What a moving body asks for: its CofR stays in the header where the file has no column for it."""
+    rule = source.reduction
+    if rule is None or rule.kind != "oscillatory":
+        return None
+    if rule.motion in ("roll", "pitch", "yaw") and not source.axes and "axes" not in header.frame.model_fields_set:
+        text = "tank where the body turns in the mesh (the loads are along the mesh's axes), body where it does not"
+        raise InputError(f"{where}, key source.axes", f"nothing, and a motion of {rule.motion}", text)
+    moves = next((m for _, _, m in openfoam.loads(folder, source.cofr)), False)
+    if moves and source.moments_about == "fixed":
+        raise InputError(
+            f"{where}, key source.moments_about", "'fixed'", "nothing: the file's CofR moves with the body"
+        )
+    about = "body" if moves else source.moments_about or "fixed"
+    return moving_body(list(openfoam.LOADS), source, header, numbers, about, where)
+
+
+def _foam_pieces(folder: Path, source: Source, header: CampaignFile, where: str) -> Pieces:
     """Starts reading one function object: SI, moments about the campaign's point."""
     density = header.fluid.density_kgpm3 / float(source.rho_inf or 1.0)
+    factors = np.ones(7)
+    for name, value in source.factor.items():
+        if name not in openfoam.LOADS:
+            raise InputError(f"{where}, key source.factor.{name}", "no load of the file", ", ".join(openfoam.LOADS))
+        factors[1 + openfoam.LOADS.index(name)] = value
     point = header.moment_point
     origin = source.vehicle_origin
 
     def pieces() -> Iterator[np.ndarray]:
         fixed = None
-        for values, centre, moving in openfoam.loads(folder):
+        for values, centre, moving in openfoam.loads(folder, source.cofr):
             if not moving:
                 if fixed is not None and (centre != fixed).any():
                     raise InputError(str(folder), f"CofR {fixed} and {centre}", "one moment point in all restarts")
@@ -403,7 +491,7 @@ def _foam_pieces(folder: Path, source: Source, header: CampaignFile) -> Pieces:
             elif origin is not None:
                 text = "no vehicle_origin: a moving CofR is the body's moment point"
                 raise InputError(str(folder), "CofR moves", text)
-            out = values.copy()
+            out = values * factors
             if origin is not None:
                 arm = centre - np.array(origin) - np.array([point.x_m, point.y_m, point.z_m])
                 out[:, 4:] += np.cross(np.broadcast_to(arm, (len(out), 3)), out[:, 1:4])

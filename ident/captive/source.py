@@ -19,6 +19,17 @@ MOTIONS = {
     "pitch": ("q", "qdot"),
     "yaw": ("r", "rdot"),
 }
+# Keys that say how a text is written, by reader; a key that a reader does not look at is refused.
+_TEXT_KEYS = ("delimiter", "decimal", "thousands", "encoding", "skip")
+_COLUMN_KEYS = ("columns", "patterns", "ignore", "normalisation", "reference", "subtract", "words")
+_FOAM_KEYS = ("parts", "rho_inf", "vehicle_origin", "cofr")
+LOOKED_AT = {
+    "table": (*_TEXT_KEYS, *_COLUMN_KEYS, "header_pattern", "units_row"),
+    "starccm": (*_TEXT_KEYS, *_COLUMN_KEYS, "header_pattern", "units_row"),
+    "columns": (*_TEXT_KEYS, *_COLUMN_KEYS, "header_pattern", "names", "widths"),
+    "parquet": _COLUMN_KEYS,
+    "openfoam": _FOAM_KEYS,
+}
 NO_COLUMNS = "no subtract: a function object of the patches that are wanted, OpenFOAM's files have no other columns"
 Vector = Annotated[list[float], Field(min_length=3, max_length=3)]
 Positive = Annotated[float, Field(gt=0, le=1e9)]
@@ -42,7 +53,9 @@ class Reduction(Data):
     frequency_hz : Its frequency, unless a column ``frequency`` gives it.
     amplitude : Amplitude of the displacement [m or rad], unless a column ``displacement``
         measures it.
-    phase_deg : Phase of the displacement at time zero, A sin(2 pi f t + phase).
+    phase_deg : Phase of the displacement at time zero, A sin(2 pi f t + phase). Asked for where the
+        clock does not start at zero and no column ``displacement`` measures it.
+    delay_s : Channel -> time by which it comes late (a filter, an acquisition), taken off: ``Y = 0.05``.
     """
 
     kind: Literal["steady", "oscillatory", "acceleration"]
@@ -53,6 +66,7 @@ class Reduction(Data):
     frequency_hz: Positive | None = None
     amplitude: Annotated[float, Field(gt=0, le=1e6)] | None = None
     phase_deg: Annotated[float, Field(ge=-360, le=360)] = 0.0
+    delay_s: dict[str, Annotated[float, Field(ge=-1e3, le=1e3)]] = Field(default_factory=dict)
 
     @model_validator(mode="after")
     def _motion_is_named(self) -> Reduction:
@@ -60,7 +74,29 @@ class Reduction(Data):
             raise ValueError(f"motion, one of {', '.join(MOTIONS)}: an oscillatory test needs it")
         if self.start_s is not None and self.end_s is not None and self.end_s <= self.start_s:
             raise ValueError("end_s after start_s")
+        self._nothing_is_idle()
         return self
+
+    def _nothing_is_idle(self) -> None:
+        """Keys that this kind of reduction does not look at are refused."""
+        for key in ("motion", "frequency_hz", "amplitude", "phase_deg", "delay_s"):
+            if self.kind != "oscillatory" and key in self.model_fields_set:
+                raise ValueError(f"no {key}: a {self.kind} test has no oscillation that it is of")
+
+
+class Reference(Data):
+    """Area and length that coefficients were made dimensionless with.
+
+    Attributes
+    ----------
+    area_m2 : Reference area A: ``REF_AREA`` of a solver, chord times span of a plane.
+    length_m : Reference length of moments (and rates): ``REF_LENGTH``, the chord. Needed by moments alone.
+    source : Where they are stated.
+    """
+
+    area_m2: Annotated[float, Field(gt=0, le=1e9)]
+    length_m: Annotated[float, Field(gt=0, le=1e6)] | None = None
+    source: Annotated[str, Field(min_length=1, max_length=500)]
 
 
 class Subtract(Data):
@@ -89,7 +125,10 @@ class Source(Data):
     """Some files of a campaign that share a format; every key is in ``docs/readers.md``.
 
     ``within`` limits the states whose loads are used: ``beta_deg = [-20, 20]``. Runs outside
-    stay in the run table with all their loads excluded.
+    stay in the run table with all their loads excluded. ``axes`` and ``moments_about`` say it of
+    these files where they are not as ``[frame]`` says, or the body moves in its axes; ``factor`` divides
+    out what a header does not say, header or quantity -> factor; ``words`` maps words of the files to
+    those of this program.
     """
 
     files: Annotated[str, Field(min_length=1, max_length=300)]
@@ -114,6 +153,13 @@ class Source(Data):
     parts: dict[str, str] = Field(default_factory=dict)
     rho_inf: Positive | None = None
     vehicle_origin: Vector | None = None
+    cofr: Vector | None = None
+    axes: Literal["", "body", "flow", "tank"] = ""
+    moments_about: Literal["", "body", "fixed"] = ""
+    factor: dict[str, Annotated[float, Field(ge=-1e9, le=1e9)]] = Field(default_factory=dict)
+    missing: Annotated[list[float], Field(max_length=20)] = Field(default_factory=list)
+    words: dict[str, str] = Field(default_factory=dict)
+    reference: Reference | None = None
     reduction: Reduction | None = None
     subtract: list[Subtract] = Field(default_factory=list)
 
@@ -138,6 +184,14 @@ class Source(Data):
                 raise ValueError(f"{name} = [lowest, highest], the first below the second")
         return within
 
+    @field_validator("factor")
+    @classmethod
+    def _factors_count(cls, factor: dict[str, float]) -> dict[str, float]:
+        for name, value in factor.items():
+            if value == 0.0:
+                raise ValueError(f"another factor than zero for {name!r}; leave the column out with ignore")
+        return factor
+
     @model_validator(mode="after")
     def _reduction_fits(self) -> Source:
         if self.rows == "history" and self.reduction is None:
@@ -148,9 +202,26 @@ class Source(Data):
             raise ValueError("rows = 'history': OpenFOAM writes time histories")
         if self.reader == "openfoam" and self.subtract:
             raise ValueError(NO_COLUMNS)
+        if self.rows == "runs" and self.reduction is not None:
+            for key in ("start_s", "end_s", "rate_hz", "phase_deg", "delay_s"):
+                if key in self.reduction.model_fields_set:
+                    raise ValueError(f"no reduction.{key} with rows = 'runs': there is no time in a table of harmonics")
+        if self.moments_about and (self.reduction is None or self.reduction.kind != "oscillatory"):
+            raise ValueError("no moments_about: only in an oscillation does a body move away from a fixed moment point")
+        if self.reference is not None and self.normalisation != "half_rho_A":
+            raise ValueError("no table reference: normalisation = 'half_rho_A' alone divides by a stated area")
+        if self.names and self.header_pattern:
+            raise ValueError("one of names and header_pattern: both say what the columns are")
         if self.files.startswith(("/", "~")) or ".." in self.files.replace("\\", "/").split("/"):
             raise ValueError("a path below the campaign folder")
         return self
+
+
+def idle_keys(source: Source, reader: str) -> list[str]:
+    """Keys of a source that its reader does not look at."""
+    some = {key for keys in LOOKED_AT.values() for key in keys}
+    own = {*LOOKED_AT[reader], *(("subtract",) if reader == "openfoam" else ())}
+    return sorted(k for k in source.model_fields_set if k in some and k not in own)
 
 
 def _compiled(text: str) -> None:

@@ -68,7 +68,7 @@ def taken_columns(sheet: Sheet, source: Source, header: CampaignFile, totals: se
         kinds = {}
         for name, declared in one.columns.items():
             at = position(sheet, name)
-            kinds[at] = column(sheet.header[at], declared, sheet.where)
+            kinds[at] = column(sheet.header[at], declared, sheet.where, factored=one.factor != 1.0)
             if owner(kinds[at].quantity) not in OUTPUTS or kinds[at].quantity.startswith("s_"):
                 raise InputError(f"{place}.columns.{name[:60]}", repr(declared), f"a load: {' '.join(OUTPUTS)}")
         given = {kind.quantity for kind in kinds.values()}
@@ -141,7 +141,7 @@ def off_table(
         own = runs[["file", "row"]].assign(**({"U": runs["U"]} if "U" in runs else {}))
         own[one.kind.quantity] = parts[i].to_numpy()
         primed = {one.kind.quantity} if one.kind.primed else set()
-        load = dimensional(own, primed, source.normalisation, header, str(sheet.path))[one.kind.quantity]
+        load = dimensional(own, primed, source, header, str(sheet.path))[one.kind.quantity]
         for total, share in one.shares.items():
             bare = load.isna() & out[total].notna()
             if bare.any():

@@ -19,6 +19,7 @@ from ident.captive.campaign import Campaign
 from ident.captive.readers.opening import open_sheet
 from ident.captive.readers.table import run_cells
 from ident.captive.source import Source
+from ident.checks import axes as checks_axes
 from ident.checks import copies as checks_copies
 from ident.checks import histories as checks_histories
 from ident.checks import physics as checks_physics
@@ -34,7 +35,7 @@ if TYPE_CHECKING:
     from rich.table import Table
 
 # Importing a module enters its checks in the registry.
-_MODULES = (checks_copies, checks_histories, checks_physics, checks_runs, checks_tables)
+_MODULES = (checks_axes, checks_copies, checks_histories, checks_physics, checks_runs, checks_tables)
 _COLOURS = {"error": "red", "warning": "yellow", "info": "cyan"}
 
 
@@ -197,6 +198,7 @@ def refuse_errors(folder: Path, findings: list[Finding]) -> None:
     place = f"{folder / first.file}" + (f", row {first.shown_rows}" if first.rows else "")
     place += f", column {' '.join(first.columns)}" if first.columns else ""
     rest = f"; {more} more, see ident check {folder}" if more else ""
+    rest += '; or --force "why it is fitted all the same"'
     raise InputError(place, f"{first.what} (check {first.check})", first.remedy + rest)
 
 

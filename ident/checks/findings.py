@@ -198,6 +198,18 @@ def registered() -> dict[str, list[Function]]:
     return {name: [f for k, f in _FUNCTIONS.items() if k.split(".")[0] == name] for name in rules()}
 
 
+def together(runs: pd.DataFrame) -> pd.Series:
+    """What runs were made together: their file, or the glob of a source with a file a run."""
+    if "files" not in runs:
+        return runs["file"].astype(str)
+    return runs["file"].astype(str).where(runs["files"].isna() | (runs["files"] == ""), runs["files"]).astype(str)
+
+
+def rows_of(group: pd.DataFrame) -> list[int]:
+    """Rows of runs that stand in one file; none where each has a file of its own."""
+    return [int(r) for r in group["row"]] if group["file"].nunique() == 1 else []
+
+
 def dynamic(runs: pd.DataFrame, body: Body) -> pd.Series:
     """1/2 rho (U^2 + (Omega L)^2) L^2 [N] of every run; NaN for a body at rest."""
     rate2 = sum(runs[c].fillna(0.0) ** 2 for c in ("p", "q", "r"))

@@ -108,3 +108,29 @@ def unsettled(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
         own = evidence.runs["run_id"].isin([name for one in group for name in one.runs])
         known = bool(own.any() and declared(evidence, evidence.runs[own]).all())
         yield rule.finding(file, [], list(channels), "; ".join(words), milder(rule, known))
+
+
+@check("channels")
+def samples_left_out(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
+    """What was left out of each history, and channels that are clipped; one finding a file."""
+    for one in evidence.histories:
+        if one.left_out:
+            words = [f"{n} {kind} samples of {name}" for (kind, name), n in one.left_out.items()]
+            channels = list(dict.fromkeys(name for _, name in one.left_out))
+            share = sum(one.left_out.values()) / max(one.samples, 1)
+            severe = "error" if share > rule.limits["share"] else rule.severity
+            what = f"run {one.run_id}: {', '.join(words)} of {one.samples} are no measurements and left out"
+            yield rule.finding(one.file, [], channels, what, severe)
+        for name, text in one.clipped.items():
+            yield rule.finding(one.file, [], [name], f"run {one.run_id}: {name} is clipped, {text}", "error")
+
+
+@check("motion")
+def another_frequency(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
+    """Oscillations whose record contradicts the stated frequency."""
+    for one in evidence.histories:
+        if one.stated_hz is not None and one.line is not None:
+            name = one.loads[one.line.channel]
+            what = f"run {one.run_id}: {one.stated_hz:g} Hz stated, {name} oscillates at {one.line.frequency:.6g} +- "
+            what += f"{one.line.stderr:.1g} Hz, which was used"
+            yield rule.finding(one.file, [], [name], what)

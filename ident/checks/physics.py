@@ -11,9 +11,10 @@ from importlib.resources import files
 import numpy as np
 import pandas as pd
 
-from ident.checks.findings import Body, Evidence, Finding, Rule, check, declared, kept, milder, prime
+from ident.checks.findings import Body, Evidence, Finding, Rule, check, declared, kept, milder, prime, together
 from ident.identification.solver import Solver, check_levers
 from sim.boat.catalogue import ACCELERATIONS, OUTPUTS
+from sim.boat.parts import vehicle_terms
 
 # Load component that answers each acceleration, and the moment of each cross force.
 _ANSWERS = dict(zip(ACCELERATIONS, OUTPUTS, strict=True))
@@ -42,19 +43,41 @@ def prime_sizes(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
     body = evidence.body
     if body is None:
         return
+    planes = [p.name for p in evidence.vehicle.planes] if evidence.vehicle else []
     for size in _sizes():
-        runs = evidence.runs[(evidence.runs["test"] == size["test"]) & evidence.runs["part"].isin(["", "hull"])]
+        parts = planes if size["over"] == "plane" else ["", "hull"]
+        runs = evidence.runs[(evidence.runs["test"] == size["test"]) & evidence.runs["part"].isin(parts)]
         low, high, output = float(size["low"]), float(size["high"]), size["output"]
-        for file, group in runs.groupby("file", sort=False):
+        for file, group in runs.groupby(together(runs), sort=False):
             values = prime(group, output, body).where(kept(group, output))
             value = _slope(group, size["over"], output, body) if size["over"] else float(values.median())
             value = abs(value)
-            if not value > 0.0 or low <= value <= high:
+            # A plane whose force along one axis is small is turned the other way, not too small.
+            if not value > 0.0 or ((low <= value or bool(planes and parts == planes)) and value <= high):
                 continue
             powers = [10.0**p for p in range(-4, 5) if p and low <= value / 10.0**p <= high]
             off = f"; {' or '.join(f'{p:g}' for p in powers)} times too large would be in it" if powers else ""
             what = f"{size['quantity']} is {value:.3g}, boats and ships have {low:g} to {high:g}{off}"
             yield rule.finding(str(file), [], [output], what)
+
+
+@check("size")
+def published_sizes(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
+    """Published coefficients: the ranges of the slopes, and no coefficient of order one in 1/2 rho L^n."""
+    runs = evidence.runs
+    if "coefficient" not in runs or "value" not in runs or evidence.vehicle is None:
+        return
+    ranges = {s["coefficient"]: (float(s["low"]), float(s["high"])) for s in _sizes() if s["coefficient"]}
+    norms = {t.name: t.norm for t in vehicle_terms(evidence.vehicle)}
+    given = runs[runs["coefficient"].isin(list(norms)) & runs["value"].notna() & (runs["value"] != 0.0)]
+    for _, run in given[given["coefficient"].map(norms) == "rho/2 L"].iterrows():
+        name, value = str(run["coefficient"]), abs(float(run["value"]))
+        low, high = ranges.get(name, (0.0, rule.limits["published"]))
+        if low <= value <= high:
+            continue
+        what = f"{name} = {run['value']:.4g} in 1/2 rho L^n, boats and ships have {low:g} to {high:g}: "
+        what += "a value with a dimension, of another normalisation, per degree, or times a power of ten?"
+        yield rule.finding(str(run["file"]), [int(run["row"])], ["value"], what)
 
 
 # -- levers ------------------------------------------------------------------------------

@@ -15,12 +15,15 @@ from ident.commands.shared import DB, OUT, WAIT, console_for, emit, json_to, out
 @DB
 @click.option("-m", "--message", default="", help="Message stored with the version.")
 @json_to("Write the summary as JSON.")
-@click.option("--strict", is_flag=True, help="Commit nothing when a quality check finds an error.")
+@click.option(
+    "--force", default="", metavar="REASON", help="Fit in spite of errors of ident check; the reason is stored."
+)
 @WAIT
-def fit(folder: Path, db: str, message: str, json_path: str | None, strict: bool, wait: float) -> None:
+def fit(folder: Path, db: str, message: str, json_path: str | None, force: str, wait: float) -> None:
     """Identify the coefficients of a campaign and commit one database version.
 
-    FOLDER holds campaign.toml and one CSV a test, or such folders.
+    FOLDER holds campaign.toml and one CSV a test, or such folders. Nothing is committed while ident check
+    finds an error, unless --force says why; the reason stands in the version.
 
     \b
     Example: ident fit raw_captive_data/ --db coeff_db
@@ -30,7 +33,7 @@ def fit(folder: Path, db: str, message: str, json_path: str | None, strict: bool
 
     console = console_for(quiet=json_path == "-")
     with told() as tell:
-        done = ident.fit(folder, db, message, strict, wait, tell)
+        done = ident.fit(folder, db, message, force, wait, tell)
     for one in done:
         show(one, console)
     if json_path:

@@ -12,6 +12,19 @@ from sim.boat.catalogue import OUTPUTS
 from sim.files.frames import PROGRAM, SENSES
 
 _TURNED = (*OUTPUTS, *MOTION)
+# Keys of a source that are kept where they are stated.
+_STATED = (
+    "axes",
+    "moments_about",
+    "factor",
+    "missing",
+    "words",
+    "reference",
+    "cofr",
+    "vehicle_origin",
+    "within",
+    "match",
+)
 
 
 def conversions(campaign: Campaign) -> dict[str, Any]:
@@ -40,6 +53,7 @@ def conversions(campaign: Campaign) -> dict[str, Any]:
     return {
         "sources": [
             {k: one[k] for k in ("files", "rows", "normalisation", "rho_inf", "reduction", "subtract")}
+            | {k: one[k] for k in _STATED if one[k]}
             for one in data["source"]
         ],
         "histories": [{"run_id": r.run_id, "file": r.file, "reduction": r.words()} for r in campaign.reduced],
@@ -54,6 +68,7 @@ def conversions(campaign: Campaign) -> dict[str, Any]:
         "moment_point": data["moment_point"],
         "inertia": inertia,
         "half_model": data["half_model"],
+        **({"hydrostatics": data["hydrostatics"]} if data["hydrostatics"] else {}),
         "scale": data["scale"],
         "fluid": data["fluid"],
         "uncertainty": data["uncertainty"],
@@ -108,6 +123,7 @@ def steps(stored: dict[str, Any]) -> list[tuple[str, str]]:
         ("Moments", _moments(stored["moment_point"])),
         ("Model's own inertia", _inertia(stored["inertia"])),
         ("Half model", _half(stored["half_model"])),
+        *_hydrostatics(stored.get("hydrostatics")),
         ("Scale", _scale(stored["scale"], stored["fluid"])),
         ("Standard errors", f"floor {stored['uncertainty']['floor']:g}; {stored['uncertainty']['source']}"),
     ]
@@ -121,7 +137,8 @@ def _sources(sources: list[dict[str, Any]]) -> str:
     for one in sources:
         text = f"{one['files']}: " + ("a history a run" if one["rows"] == "history" else "a row a run")
         text += f", dimensionless by {one['normalisation']}" if one["normalisation"] else ""
-        texts.append(text + (f", rhoInf {one['rho_inf']:g}" if one["rho_inf"] else ""))
+        text += f", rhoInf {one['rho_inf']:g}" if one["rho_inf"] else ""
+        texts.append(text + "".join(f", {k} {one[k]}" for k in _STATED if one.get(k)))
     return "; ".join(texts)
 
 
@@ -173,6 +190,7 @@ def _frame(frame: dict[str, Any]) -> list[tuple[str, str]]:
         ),
         ("Rotations", f"{frame['rotations']} about these axes"),
         ("Angles", angles[frame["angles"]]),
+        *([("Loads along", f"the {frame['axes']}, turned to the body")] if frame.get("axes", "body") != "body" else []),
     ]
 
 
@@ -194,6 +212,14 @@ def _inertia(inertia: dict[str, Any]) -> str:
 
 def _half(half: dict[str, Any] | None) -> str:
     return f"{half['plane']}: loads doubled ({half['source']})" if half else "no: the whole body was tested"
+
+
+def _hydrostatics(own: dict[str, Any] | None) -> list[tuple[str, str]]:
+    if not own:
+        return []
+    centre = ", ".join(f"{x:g}" for x in own["centre_m"])
+    text = f"{own['force_n']:g} N upwards at ({centre}) m taken off {' '.join(own['parts'])}, body {own['attitude']}"
+    return [("Hydrostatic load", f"{text}; {own['source']}")]
 
 
 def _scale(scale: dict[str, Any], fluid: dict[str, Any]) -> str:

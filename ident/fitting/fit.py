@@ -89,9 +89,13 @@ class Fit:
         return html_table(title, ("coefficient", *table.columns[:5]), rows)
 
 
-def metadata(campaign: Campaign, found: Identification, message: str, findings: list[Finding]) -> dict[str, str]:
+def metadata(
+    campaign: Campaign, found: Identification, message: str, findings: list[Finding], force: str = ""
+) -> dict[str, str]:
     """What a commit carries beside its rows: provenance, inputs, conversions, notes of the fit."""
     header = campaign.header
+    # A version that was fitted without an error of the checks does not carry the key.
+    forced = {"forced": force.strip()} if any(f.severity == "error" for f in findings) else {}
     return {
         "campaign": header.name,
         "facility": header.facility,
@@ -106,14 +110,14 @@ def metadata(campaign: Campaign, found: Identification, message: str, findings: 
         "quality": json.dumps({k: q.model_dump() for k, q in header.quality.items()}),
         "checks": json.dumps([f.as_json() for f in findings]),
         "message": message,
-    }
+    } | forced
 
 
 def fit(
     folder: str | os.PathLike[str],
     db: str | os.PathLike[str] = "coeff_db",
     message: str = "",
-    strict: bool = False,
+    force: str = "",
     wait: float = WAIT,
     tell: Tell = silent,
 ) -> Results[Fit]:
@@ -128,7 +132,8 @@ def fit(
     folder : Campaign folder, or a folder of campaign folders.
     db : Folder or object-store URL of the database; made when there is none.
     message : Stored with the version.
-    strict : Refuse a campaign with a quality finding of severity ``error``.
+    force : Why a campaign is fitted although a quality check finds an error; stored with the version.
+        Empty to refuse it.
     wait : How long to wait for other writers of the database [s].
     tell : Told what is done, how much of it, and of how much.
 
@@ -140,7 +145,8 @@ def fit(
     Raises
     ------
     InputError
-        For bad input in any campaign, before anything is committed.
+        For bad input in any campaign or an error that a check finds, before anything is committed;
+        for a reason where no check finds an error.
 
     References
     ----------
@@ -169,13 +175,15 @@ def fit(
             raise InputError(str(path / "campaign.toml"), f"vehicle {name!r} has {names.count(name)} campaigns", text)
     identified = [identify(campaign, tell) for campaign in read]
     checked = [check_campaign(*one, tell) for one in zip(read, paths, identified, strict=True)]
-    if strict:
+    if not force.strip():
         for path, findings in zip(paths, checked, strict=True):
             refuse_errors(path, findings)
+    elif not any(f.severity == "error" for findings in checked for f in findings):
+        raise InputError("--force", repr(force[:60]), "nothing: no check finds an error")
     ready = [(campaign, found, database_rows(found)) for campaign, found in zip(read, identified, strict=True)]
     done: list[Fit] = []
     for (campaign, found, rows), findings in zip(ready, checked, strict=True):
-        version, new = commit(path_of_db, rows, metadata(campaign, found, message, findings), wait)
+        version, new = commit(path_of_db, rows, metadata(campaign, found, message, findings, force), wait)
         done.append(Fit(campaign, found, rows, version, new, digest(rows), findings))
     return Results(done)
 

@@ -58,6 +58,7 @@ def _provenance(db: str, number: int, commit: Version, vehicle: Vehicle) -> list
         ("Parent version", known.get("parent", "") or "none: the first commit"),
         ("Program", known.get("program", "")),
         ("Message", known.get("message", "")),
+        *([("Fitted in spite of errors, because", known["forced"])] if known.get("forced") else []),
         ("Campaign", known.get("campaign", "")),
         ("Facility", known.get("facility", "")),
         ("Frame of the campaign", known.get("frame", "")),

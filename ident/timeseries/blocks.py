@@ -40,31 +40,36 @@ class Condensed:
         self._full = np.zeros((0, 2 + self.p + channels))
         self._rest = np.zeros((0, 2 + self.p + channels))
         self._last: float | None = None
-        self._alone: tuple[Array, Array] | None = None
+        self._alone: tuple[Array, Array, NDArray[np.bool_]] | None = None
 
-    def add(self, time: Array, values: Array) -> None:
+    def add(self, time: Array, values: Array, bad: NDArray[np.bool_] | None = None) -> None:
         """Take in some samples.
 
         Parameters
         ----------
         time : (n,) rising, [s].
         values : (n, channels).
+        bad : (n,) samples to leave out; they weigh nothing, and their neighbours no more for it.
         """
+        bad = np.zeros(time.size, dtype=bool) if bad is None else bad
         if self._alone is not None:
             time, values = np.append(self._alone[0], time), np.vstack([self._alone[1], values])
+            bad = np.append(self._alone[2], bad)
             self._alone = None
         if not time.size:
             return
         if self._last is None and time.size == 1:
             # The first step is not known before the second sample.
-            self._alone = (time, values)
+            self._alone = (time, values, bad)
             return
-        self.samples += time.size
+        self.samples += time.size - int(bad.sum())
         # A sample stands for the step that ends in it, so uneven steps weigh as they last.
         step = np.diff(time, prepend=time[0] if self._last is None else self._last)
         if self._last is None:
             step[0] = step[1]
         self._last = float(time[-1])
+        if bad.any():
+            step, time, values = step[~bad], time[~bad], values[~bad]
         sample = np.column_stack([time, self.regressors(time), values])
         rows = np.column_stack([step, step[:, None] * sample])
         self._rest = np.vstack([self._rest, rows])
@@ -125,9 +130,11 @@ def powers(middle: float, span: float) -> Regressors:
     return regressors
 
 
-def condense(chunks: Iterator[tuple[Array, Array]], regressors: Regressors, channels: int) -> Condensed:
-    """Feed all (time, values) pieces of a history into block means."""
+def condense(
+    chunks: Iterator[tuple[Array, Array, NDArray[np.bool_]]], regressors: Regressors, channels: int
+) -> Condensed:
+    """Feed all (time, values, samples to leave out) pieces of a history into block means."""
     condensed = Condensed(regressors, channels)
-    for time, values in chunks:
-        condensed.add(time, values)
+    for time, values, bad in chunks:
+        condensed.add(time, values, bad)
     return condensed

@@ -45,6 +45,8 @@ _WILDER = 2.0
 # trend over the window, in standard errors of the mean and as a share of the scatter.
 _EFFECTIVE = 20.0
 _TREND = 3.0
+# Block means of a constant differ by so much of it.
+_ROUNDING = 1e-11
 # A channel whose whole range is below this share of the largest force or moment has settled.
 _SETTLED = 1e-3
 
@@ -295,7 +297,9 @@ def fit_history(condensed: Condensed, loads: list[str], transient: bool = True) 
     if n < max(_FEWEST, 2 * p + 2):
         raise ValueError(f"{n} samples")
     centre = y.mean(axis=0)
-    cut = mser(x, y - centre, weight) if transient else 0
+    # A channel that varies by rounding alone is constant: its last bits must not decide a cut.
+    moving = np.ptp(y, axis=0) > _ROUNDING * np.abs(y).max(axis=0)
+    cut = mser(x, np.where(moving, y - centre, 0.0), weight) if transient else 0
     w, t, xs, ys = weight[cut:], time[cut:], x[cut:], y[cut:]
     values, _ = least_squares(xs, ys - centre, w / w.mean())
     residuals = ys - centre - xs @ values

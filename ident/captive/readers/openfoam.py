@@ -17,7 +17,7 @@ header, never by their position; their count has to fit it.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -89,7 +89,9 @@ def read_layout(path: Path) -> Layout:
     rest = re.sub(r"^#\s*Time\s*", "", text)
     centre = next((m for _, t in comments if (m := _COFR.match(t))), None)
     found = [_PLAIN.number(cell) for cell in centre[1].strip("() ").split()] if centre else []
-    point = np.array(found, dtype=float) if found and None not in found else None
+    if centre and (None in found or not np.isfinite(np.array(found, dtype=float)).all()):
+        raise InputError(where, centre[1][:80], "a moment point '# CofR : (x y z)' of numbers")
+    point = np.array(found, dtype=float) if found else None
     if _GROUP.search(rest):
         return _grouped(where, rest, point)
     return _single(where, rest, title, point)
@@ -124,7 +126,7 @@ def _grouped(where: str, rest: str, point: Array | None) -> Layout:
         np.array(at["moment"]),
         np.zeros((3, 0), dtype=int),
         moving,
-        None if moving else _stated(where, point),
+        None if moving else point,
     )
 
 
@@ -144,13 +146,7 @@ def _single(where: str, rest: str, title: str, point: Array | None) -> Layout:
     totals = np.array([[names.index(f"total_{axis}")] for axis in "xyz"])
     none = np.zeros((3, 0), dtype=int)
     force = title == "Force"
-    return Layout(names, parts if force else none, none if force else parts, totals, [], _stated(where, point))
-
-
-def _stated(where: str, point: Array | None) -> Array:
-    if point is None or not np.isfinite(point).all():
-        raise InputError(where, "no line '# CofR : (x y z)'", "the moment point in the header, as OpenFOAM writes it")
-    return point
+    return Layout(names, parts if force else none, none if force else parts, totals, [], point)
 
 
 def _rows(path: Path, layout: Layout) -> Iterator[tuple[int, Array]]:
@@ -259,12 +255,13 @@ def merged(paths: list[Path]) -> Iterator[tuple[Layout, Path, int, Array]]:
                 yield layout, path, row, values[keep]
 
 
-def loads(folder: Path) -> Iterator[tuple[Array, Array, bool]]:
+def loads(folder: Path, stated: Sequence[float] | None = None) -> Iterator[tuple[Array, Array, bool]]:
     """Loads of one function object, all shares added up.
 
     Parameters
     ----------
     folder : ``postProcessing/<function object>`` with one folder a start time.
+    stated : CofR in mesh axes of files that name none, as foam-extend writes them.
 
     Yields
     ------
@@ -285,19 +282,25 @@ def loads(folder: Path) -> Iterator[tuple[Array, Array, bool]]:
                 raise InputError(f"{path}, row 1", "one group of loads", "forces and moments")
             found = np.column_stack([values[:, 0], _sums(layout.forces, values), _sums(layout.moments, values)])
             moving = bool(layout.moving)
-            yield found, values[:, layout.moving] if moving else _point(layout, path, row), moving
+            centre = values[:, layout.moving] if moving else _point(layout, path, row, stated)
+            yield found, centre, moving
         return
     forces, moments = series(folder, ("force",)), series(folder, ("moment",))
     if not forces or len(forces) != len(moments):
         found_text = ", ".join(sorted(p.name for p in folder.glob("*/*.dat")))[:120] or "no .dat file"
         raise InputError(str(folder), found_text, "<start>/forces.dat, or force.dat and moment.dat")
-    yield from _paired(forces, moments)
+    yield from _paired(forces, moments, stated)
 
 
-def _point(layout: Layout, path: Path, row: int) -> Array:
-    if layout.centre is None:
-        raise InputError(f"{path}, row {row}", "no moment point", "a line '# CofR : (x y z)'")
-    return layout.centre
+def _point(layout: Layout, path: Path, row: int, stated: Sequence[float] | None) -> Array:
+    """The moment point of the header, or the stated one where it names none."""
+    if layout.centre is None and stated is None:
+        text = "a line '# CofR : (x y z)', or cofr = [x, y, z] in [[source]]: the CofR of the function object"
+        raise InputError(f"{path}, row {row}", "no moment point", text)
+    if layout.centre is not None and stated is not None:
+        found = f"cofr = {list(stated)} stated, and CofR {layout.centre} in the header"
+        raise InputError(f"{path}, row 1 (header)", found, "cofr for files alone that name none")
+    return np.array(stated, dtype=float) if layout.centre is None else layout.centre
 
 
 def _sums(positions: Array, values: Array) -> Array:
@@ -316,14 +319,20 @@ def _checked(layout: Layout, path: Path, row: int, values: Array) -> Array:
     return found
 
 
-def _paired(forces: list[Path], moments: list[Path]) -> Iterator[tuple[Array, Array, bool]]:
+def _paired(
+    forces: list[Path], moments: list[Path], stated: Sequence[float] | None
+) -> Iterator[tuple[Array, Array, bool]]:
     """``force.dat`` and ``moment.dat`` row by row; their times have to agree."""
 
     def checked(paths: list[Path], title: str) -> Iterator[tuple[Path, Array, Array]]:
         for layout, path, row, values in merged(paths):
             if (layout.forces.size > 0) != (title == "Force"):
                 raise InputError(f"{path}, row 1", "the other of force and moment", f"# {title}")
-            yield path, np.column_stack([values[:, 0], _checked(layout, path, row, values)]), _point(layout, path, row)
+            yield (
+                path,
+                np.column_stack([values[:, 0], _checked(layout, path, row, values)]),
+                _point(layout, path, row, stated),
+            )
 
     left, right = checked(forces, "Force"), checked(moments, "Moment")
     a: tuple[Path, Array, Array] | None = None

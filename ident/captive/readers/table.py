@@ -17,7 +17,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from ident.captive.quantities import Column, column, split
+from ident.captive.quantities import Column, column, owner, split
 from ident.captive.readers.text import COMMENTS, Dialect, Lines, blocks, decimal_mark, head, numbers, sniff
 from ident.captive.source import Source
 from sim.files.errors import InputError
@@ -334,7 +334,8 @@ def columns_of(sheet: Sheet, source: Source, text: tuple[str, ...]) -> list[Colu
         elif (declared is None and (source.patterns or ignored(header, source))) or (declared or header) in text:
             found.append(None)
         else:
-            found.append(column(header, declared, sheet.where))
+            factored = any(n in source.factor for n in (header, name))
+            found.append(_times(column(header, declared, sheet.where, factored), source, sheet.where))
     for key in source.columns:
         if key not in sheet.header and key not in [split(h)[0] for h in sheet.header]:
             shown = ", ".join(sheet.header)[:200]
@@ -344,6 +345,21 @@ def columns_of(sheet: Sheet, source: Source, text: tuple[str, ...]) -> list[Colu
         if quantities.count(quantity) > 1:
             raise InputError(sheet.where, f"{quantity} stands twice", "one column a quantity")
     return found
+
+
+def _times(kind: Column, source: Source, where: str) -> Column:
+    """A column with the factor that ``[source.factor]`` puts on it, by its header or its quantity."""
+    names = [n for n in dict.fromkeys((kind.name, split(kind.name)[0], kind.quantity)) if n in source.factor]
+    load = owner(kind.quantity)
+    if not names and load in source.factor and kind.quantity != load:
+        # A load's factor is its standard error's and its harmonics' as well.
+        names = [load]
+    if not names:
+        return kind
+    if len(names) > 1:
+        raise InputError(f"{where}, column {kind.name[:60]!r}", f"factors under {' and '.join(names)}", "one factor")
+    value = source.factor[names[0]]
+    return replace(kind, factor=kind.factor * (abs(value) if kind.quantity.startswith("s_") else value))
 
 
 def _by_pattern(sheet: Sheet, source: Source) -> dict[str, str]:

@@ -1,0 +1,131 @@
+"""Whatever is declared counts: keys of a source and columns of runs that nothing uses are refused."""
+
+from __future__ import annotations
+
+import fnmatch
+from collections.abc import Sequence
+
+import numpy as np
+import pandas as pd
+
+from ident.captive.published import TEST as PUBLISHED
+from ident.captive.quantities import HARMONICS, Column, owner, split
+from ident.captive.run_table import STATES
+from ident.captive.source import Source
+from sim.boat.catalogue import ACCELERATIONS, OUTPUTS
+from sim.files.errors import InputError
+
+# Quantities of a history or of an oscillation that mean nothing in a plain run.
+_OF_HISTORIES = ("time", "displacement", "frequency", "amplitude")
+_LEVERS = ("x", "y", "z")
+
+
+class Uses:
+    """What of a source its files made use of.
+
+    Parameters
+    ----------
+    source : One ``[[source]]``.
+    where : The campaign file, for the error.
+
+    Attributes
+    ----------
+    primed : Quantities that were dimensionless.
+    """
+
+    def __init__(self, source: Source, where: str) -> None:
+        self.source, self.where = source, where
+        self.primed: set[str] = set()
+        self._ignored: set[str] = set()
+        self._factors: set[str] = set()
+        self._words: set[str] = set()
+
+    def whole(self) -> None:
+        """All factors are checked where the file is read."""
+        self._factors |= set(self.source.factor)
+
+    def columns(self, header: Sequence[str], kinds: Sequence[Column | None]) -> None:
+        """Note which columns of a sheet ``ignore`` and ``factor`` name."""
+        for name in header:
+            self._ignored |= {
+                p for p in self.source.ignore if any(fnmatch.fnmatchcase(h, p) for h in (name, split(name)[0]))
+            }
+        for name, kind in zip(header, kinds, strict=True):
+            if kind is not None:
+                self._factors |= {name, split(name)[0], kind.quantity, base(kind.quantity)} & set(self.source.factor)
+
+    def translated(self, values: np.ndarray, column: str) -> np.ndarray:
+        """Words of a text column in those of this program."""
+        if column == "run_id" or not self.source.words:
+            return values
+        self._words |= set(values) & set(self.source.words)
+        return np.array([self.source.words.get(v, v) for v in values], dtype=object)
+
+    def refuse(self) -> None:
+        """Refuse what none of the files used.
+
+        Raises
+        ------
+        InputError
+            Naming the key and the reason.
+        """
+        source = self.source
+        for key, given, used, reason in (
+            ("ignore", source.ignore, self._ignored, "no column of the files fits it"),
+            ("factor", source.factor, self._factors, "no column or quantity of the files has this name"),
+            ("words", source.words, self._words, "no text column of the files holds it"),
+        ):
+            for name in given:
+                if name not in used:
+                    raise InputError(f"{self.where}, key source.{key}", f"{name[:60]!r}, and {reason}", "what is there")
+        if source.normalisation and not self.primed:
+            text = "nothing: every column of the files has a unit, so nothing is made dimensional"
+            raise InputError(f"{self.where}, key source.normalisation", repr(source.normalisation), text)
+
+
+def base(quantity: str) -> str:
+    """The load of a harmonic or a standard error: ``X`` of ``X_in2`` and ``s_X``."""
+    return owner(quantity) or quantity
+
+
+def refuse_idle_quantities(runs: pd.DataFrame) -> None:
+    """Refuse quantities that mean nothing in their runs.
+
+    Parameters
+    ----------
+    runs : Of one file, in SI.
+
+    Raises
+    ------
+    InputError
+        Naming file, row and column, and why nothing would use it.
+    """
+    ends = {f"{o}_{h}" for o in OUTPUTS for h in HARMONICS}
+    for name in runs:
+        if name in _OF_HISTORIES or name in ends:
+            text = "rows = 'history' or [source.reduction] kind = 'oscillatory': a plain run has none"
+            _refuse(runs, runs[name].notna(), str(name), text)
+    published = runs["test"] == PUBLISHED
+    for name in (*STATES[1:], "R0"):
+        if name in runs:
+            text = "nothing: a published coefficient has no state (U alone, where its unit needs a speed)"
+            _refuse(runs, published & runs[name].notna(), name, text)
+    for name in ACCELERATIONS:
+        if name in runs:
+            text = "zero, or the test acceleration: any other run is steady"
+            _refuse(runs, (runs["test"] != "acceleration") & (runs[name].fillna(0.0) != 0.0), name, text)
+    if "J" in runs:
+        text = "nothing: an advance coefficient is of a propeller's runs"
+        _refuse(runs, runs["J"].notna() & (runs["part"] != "propeller"), "J", text)
+    for name in _LEVERS:
+        if name in runs:
+            text = "nothing: levers are those of the vehicle file's sections, which alone are compared"
+            _refuse(runs, runs[name].notna() & runs["part"].isin(["hull", "propeller"]), name, text)
+
+
+def _refuse(runs: pd.DataFrame, idle: pd.Series, column: str, text: str) -> None:
+    if idle.any():
+        run = runs[idle].iloc[0]
+        raise InputError(
+            f"{run['file']}, row {run['row']}, column {column}", f"{run[column]}, declared and unused", text
+        )

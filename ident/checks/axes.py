@@ -1,0 +1,181 @@
+"""Checks of what the loads are of: along which axes, with buoyancy in them, and the same in every test."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+import pandas as pd
+
+from ident.checks.findings import (
+    Body,
+    Evidence,
+    Finding,
+    Rule,
+    check,
+    declared,
+    kept,
+    milder,
+    prime,
+    rows_of,
+    together,
+)
+from sim.boat.catalogue import ACCELERATIONS
+
+_PLANES = {"drift_horizontal": ("beta", "Y", "N"), "drift_vertical": ("alpha", "Z", "M")}
+_MOVING = ("p", "q", "r", *ACCELERATIONS)
+_HULL = ("hull", "")
+
+
+def _still(runs: pd.DataFrame) -> pd.Series:
+    return (runs[list(_MOVING)].fillna(0.0) == 0.0).all(axis=1) & runs["part"].isin(_HULL)
+
+
+@check("flow_axes")
+def along_the_flow(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
+    """Whether X grows with drift by the side force's share along the flow, X + Y tan(beta)."""
+    body = evidence.body
+    if body is None:
+        return
+    for test, (angle, force, _) in _PLANES.items():
+        runs = evidence.runs[(evidence.runs["test"] == test) & _still(evidence.runs)]
+        runs = runs[kept(runs, "X") & kept(runs, force) & (runs[angle].abs() < math.radians(rule.limits["widest"]))]
+        if runs[angle].abs().round(6).nunique() < 3:
+            continue
+        x, share = prime(runs, "X", body), prime(runs, force, body) * np.tan(runs[angle])
+        if not np.isfinite(x).all() or not float(np.ptp(share)) > 0.0:
+            continue
+        design = np.column_stack([np.ones(len(x)), share])
+        (_, slope), *_ = np.linalg.lstsq(design, x.to_numpy(), rcond=None)
+        left = x - design @ np.linalg.lstsq(design, x.to_numpy(), rcond=None)[0]
+        explained = 1.0 - float((left**2).sum() / ((x - x.mean()) ** 2).sum()) if float(np.ptp(x)) > 0.0 else 0.0
+        if explained < rule.limits["explained"] or not rule.limits["low"] < abs(slope) < rule.limits["high"]:
+            continue
+        turned = "along the flow, not the body" if slope > 0.0 else "turned to the body twice"
+        what = f"X changes with {angle} by {slope:.2f} of {force} tan({angle}): as loads {turned}, would"
+        file = ", ".join(dict.fromkeys(together(runs)))
+        yield rule.finding(file[:200], rows_of(runs), ["X", force], what)
+
+
+@check("hydrostatic")
+def weight_in_the_loads(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
+    """Z of a body at zero incidence as large as a part of its weight, and no load a boat has there."""
+    body = evidence.body
+    if body is None or body.mass is None:
+        return
+    weight = body.mass * rule.limits["gravity"]
+    runs = evidence.runs[_still(evidence.runs) & kept(evidence.runs, "Z")]
+    level = runs["alpha"].fillna(0.0).abs() < math.radians(rule.limits["level"])
+    for file, group in runs[level].groupby(together(runs[level]), sort=False):
+        z = prime(group, "Z", body)
+        share = float(group["Z"].abs().median() / weight)
+        if share > rule.limits["share"] and float(z.abs().median()) > rule.limits["prime"]:
+            what = f"Z = {group['Z'].median():.4g} N without incidence, {100 * share:.3g} % of the displaced weight "
+            what += f"({weight:.4g} N) and {float(z.abs().median()):.2g} in prime form: buoyancy or weight in the loads"
+            yield rule.finding(str(file), rows_of(group), ["Z", "M"], what)
+
+
+@check("propeller_on")
+def thrust_in_x(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
+    """X of hull runs with revolutions, from which no thrust was taken off."""
+    runs = evidence.runs
+    taken = runs["taken_X"].notna() if "taken_X" in runs else pd.Series(False, index=runs.index)
+    own = runs[(runs["part"].isin(_HULL)) & (runs["n"].fillna(0.0) != 0.0) & ~taken & kept(runs, "X")]
+    for file, group in own.groupby(together(own), sort=False):
+        what = f"X of {len(group)} hull runs with the propeller at {group['n'].min():g} to {group['n'].max():g} rev/s"
+        yield rule.finding(str(file), rows_of(group), ["X", "n"], what)
+
+
+# -- between tests -------------------------------------------------------------------------
+
+
+def _groups(evidence: Evidence, test: str, angle: str) -> Iterator[tuple[str, pd.DataFrame]]:
+    """Runs that give a load at an angle and nothing else, by how they were made: (words, runs)."""
+    runs = evidence.runs
+    rest = [m for m in ("p", "q", "r") if m in runs]
+    still = (runs[rest].fillna(0.0) == 0.0).all(axis=1) & runs["part"].isin(_HULL)
+    steady = still & _still(runs) & (runs["test"] == test)
+    phases = runs["run_id"].astype(str).str.extract(r"^(?P<cycle>.*)(?P<phase>[+-][av])$")
+    swung = phases["phase"].notna()
+    source = together(runs)
+    for file, group in runs[steady].groupby(source[steady], sort=False):
+        own = group[~swung[group.index]]
+        if len(own):
+            yield f"steady runs of {file}", own
+        if len(own) < len(group):
+            yield f"oscillations of {file}", group[swung[group.index]]
+    # The mean of a cycle: its two ends of acceleration.
+    ends = still & phases["phase"].isin(["+a", "-a"]) & (runs[angle].fillna(0.0) != 0.0)
+    for file, group in runs[ends].groupby(source[ends], sort=False):
+        cycle = phases["cycle"][group.index]
+        numbers = group.select_dtypes("number").groupby(cycle).mean()
+        texts = group.select_dtypes(exclude="number").groupby(cycle).first()
+        whole = group.groupby(cycle).size() == 2
+        yield f"means of the oscillations of {file}", numbers.join(texts)[whole].reset_index(drop=True)
+
+
+def _slope(group: pd.DataFrame, angle: str, output: str, body: Body, widest: float) -> tuple[float, float]:
+    """Slope of a prime load over the sine of an angle, odd in it, with its standard error."""
+    own = group[kept(group, output) & (group[angle].abs() <= widest + 1e-9)]
+    x = np.sin(own[angle].to_numpy(float))
+    y = prime(own, output, body).to_numpy(float)
+    # An offset of the rig is no slope: it is taken off where both sides were measured.
+    if x.size >= 3 and x.min() < 0.0 < x.max():
+        design = np.column_stack([np.ones(x.size), x])
+    else:
+        design = x[:, None]
+    if x.size < design.shape[1] or not float(np.abs(x).max(initial=0.0)) > 0.0 or not np.isfinite(y).all():
+        return math.nan, math.nan
+    error = prime(own.assign(**{output: own[f"s_{output}"]}), output, body).fillna(0.0).to_numpy(float)
+    inverse = np.linalg.pinv(design)
+    slope = float(inverse[-1] @ y)
+    left = y - design @ (inverse @ y)
+    spread = math.sqrt(float(left @ left) / (x.size - design.shape[1])) if x.size > design.shape[1] else 0.0
+    sigma = np.maximum(error, spread)
+    return slope, float(np.sqrt((inverse[-1] ** 2) @ sigma**2))
+
+
+@check("between_tests")
+def same_slope(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
+    """The load over drift or incidence, from steady runs, from oscillations, and from their means."""
+    body = evidence.body
+    if body is None:
+        return
+    for test, (angle, force, moment) in _PLANES.items():
+        groups = list(_groups(evidence, test, angle))
+        for output in (force, moment):
+            found: list[tuple[str, pd.DataFrame, float, float]] = []
+            # The same range of angles, for a curved load has no one slope.
+            reach = [float(g[angle].abs()[kept(g, output)].max()) for _, g in groups]
+            reach = [r for r in reach if r > 0.0]
+            widest = max(min(reach, default=0.0), math.radians(rule.limits["narrow"]))
+            for words, group in groups:
+                slope, error = _slope(group, angle, output, body, widest)
+                if math.isfinite(slope):
+                    found.append((words, group, slope, error))
+            yield from _compared(evidence, rule, output, angle, found)
+
+
+def _compared(
+    evidence: Evidence, rule: Rule, output: str, angle: str, found: list[tuple[str, pd.DataFrame, float, float]]
+) -> Iterator[Finding]:
+    """Slopes against that of the most runs."""
+    if len(found) < 2:
+        return
+    base = max(found, key=lambda one: (one[0].startswith("steady"), len(one[1])))
+    for one in found:
+        words, group, slope, error = one
+        if one is base:
+            continue
+        off = abs(slope - base[2])
+        size = max(abs(slope), abs(base[2]))
+        if off <= rule.limits["share"] * size or off <= rule.limits["errors"] * math.hypot(error, base[3]):
+            continue
+        what = f"{output} over {angle} is {slope:.3g} (prime form, per radian) in {words}, {base[2]:.3g} in {base[0]}"
+        what += f": a factor {slope / base[2]:.2g}" if base[2] else ""
+        known = bool(declared(evidence, group).all())
+        file = str(group["file"].iloc[0])
+        far = not 1.0 / rule.limits["factor"] < slope / (base[2] or math.inf) < rule.limits["factor"]
+        severity = "error" if far and not known else milder(rule, known)
+        yield rule.finding(file, rows_of(group), [output, angle], what, severity)

@@ -1,0 +1,250 @@
+"""Samples of a history that are no measurements: sentinels, spikes, stuck and clipped channels.
+
+A first reading of a history learns what its channels are like (``Usual``), a second takes out the
+samples that are not (``Usual.faults``). Both are in bounded memory. A sample is left out with all
+of its channels, and counted by channel and kind; nothing is put in its place.
+
+* **sentinel**: a stated value (``missing``), or one written with nines only (-999, 9999, ...) far
+  outside of all others: what loggers write where they have nothing.
+* **spike**: at most three samples far outside of 98 % of the record, with neighbours inside on both
+  sides. What stands at the start of a record is the start-up transient's, and not looked at.
+* **stuck**: one value for longer than chance repeats it, while the steps around it are larger than
+  the last digit: a frozen channel, an amplifier at its limit, a dropout to zero. A computed load
+  that has settled moves by its last digit before it rests, and is none.
+* **clipped**: the largest or smallest value stands far more often than the next one: what went
+  beyond was cut off one by one, and a mean of the rest is biased. Named, nothing is left out.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+# Samples kept for the quantiles, and those carried from one piece to the next.
+_KEPT = 1 << 14
+_CARRIED = 64
+# A spike is outside of the quantiles by so many times their distance, and no longer than so many samples.
+_QUANTILES = (0.01, 0.99)
+_FAR = 5.0
+_SHORT = 3
+# Shortest run of one value that is stuck; chance of a longer one in a sound record; steps around in last digits.
+_RUN = 5
+_CHANCE = 1e-6
+_AROUND = 20
+_DIGITS = 5.0
+# Values with nines only stand outside of all others by this factor.
+_BEYOND = 3.0
+# Clipped: the extreme value stands so many times, and so many times as often as the next.
+_CLIPPED = 10
+_OFTEN = 5.0
+_NINES = re.compile(r"9{3,}0*")
+
+
+def _nines(value: float) -> bool:
+    """Whether a number is written with three nines or more and nothing else."""
+    return bool(_NINES.fullmatch(f"{abs(value):.10g}".replace(".", "").lstrip("0")))
+
+
+@dataclass
+class _Extreme:
+    """The largest value of a channel and the next one, with how often each stands."""
+
+    sign: float
+    first: float = -math.inf
+    second: float = -math.inf
+    firsts: int = 0
+    seconds: int = 0
+
+    def feed(self, values: Array) -> None:
+        signed = self.sign * values
+        for value in np.unique(signed)[-2:]:
+            count = int((signed == value).sum())
+            if value > self.first:
+                self.second, self.seconds = self.first, self.firsts
+                self.first, self.firsts = float(value), count
+            elif value == self.first:
+                self.firsts += count
+            elif value > self.second:
+                self.second, self.seconds = float(value), count
+            elif value == self.second:
+                self.seconds += count
+
+    def clipped(self) -> bool:
+        return self.firsts >= _CLIPPED and self.seconds > 0 and self.firsts > _OFTEN * self.seconds
+
+
+@dataclass
+class _Channel:
+    """What one channel is like."""
+
+    low: float = -math.inf
+    high: float = math.inf
+    digit: float = 0.0
+    longest: int = 1 << 60
+    sentinels: tuple[float, ...] = ()
+    clipped: str = ""
+
+
+@dataclass
+class Usual:
+    """What the channels of a history are like, from a first reading.
+
+    Attributes
+    ----------
+    names : Of the channels.
+    counts : Kind and channel -> samples found by ``faults`` so far.
+    """
+
+    names: list[str]
+    counts: Counter[tuple[str, str]] = field(default_factory=Counter)
+    _channels: list[_Channel] = field(default_factory=list)
+
+    @property
+    def clipped(self) -> dict[str, str]:
+        """Channel -> how it is clipped, in words."""
+        return {n: c.clipped for n, c in zip(self.names, self._channels, strict=True) if c.clipped}
+
+    def faults(self, pieces: Iterator[tuple[Array, Array]]) -> Iterator[tuple[Array, Array, NDArray[np.bool_]]]:
+        """Pieces (any columns, channels) with a mask of the samples to leave out, counted as they pass."""
+        carried = np.zeros((0, len(self.names)))
+        held: tuple[Array, Array] | None = None
+        for piece in pieces:
+            if held is not None:
+                ahead = piece[1][:_CARRIED]
+                yield (*held, self._mask(held[1], carried, ahead))
+                carried = held[1][-_CARRIED:]
+            held = piece
+        if held is not None:
+            yield (*held, self._mask(held[1], carried, held[1][:0]))
+
+    def _mask(self, values: Array, before: Array, after: Array) -> NDArray[np.bool_]:
+        whole = np.vstack([before, values, after])
+        inside = slice(len(before), len(before) + len(values))
+        bad = np.zeros(len(values), dtype=bool)
+        for c, (name, channel) in enumerate(zip(self.names, self._channels, strict=True)):
+            column = whole[:, c]
+            marks = {"sentinel": np.isin(column, channel.sentinels)} if channel.sentinels else {}
+            known = marks.get("sentinel", np.zeros(len(column), dtype=bool))
+            outside = ((column < channel.low) | (column > channel.high)) & ~known
+            if outside.any():
+                marks["spike"] = _short(outside, len(before) == 0)
+                known = known | marks["spike"]
+            if len(column) > channel.longest:
+                marks["stuck"] = _stuck(column, channel) & ~known
+            for kind, mark in marks.items():
+                found = mark[inside]
+                if found.any():
+                    self.counts[kind, name] += int(found.sum())
+                    bad |= found
+        return bad
+
+
+def _spans(mark: NDArray[np.bool_]) -> Iterator[tuple[int, int]]:
+    """First and one after last position of every run of True."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], mark, [False]]).astype(np.int8)))
+    yield from zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True)
+
+
+def _short(outside: NDArray[np.bool_], first: bool) -> NDArray[np.bool_]:
+    """Runs of at most three samples; not at the very start of a record."""
+    mark = np.zeros(len(outside), dtype=bool)
+    for a, b in _spans(outside):
+        if b - a <= _SHORT and not (first and a == 0):
+            mark[a:b] = True
+    return mark
+
+
+def _stuck(column: Array, channel: _Channel) -> NDArray[np.bool_]:
+    """Runs of one value longer than chance makes them, between steps larger than the last digit."""
+    mark = np.zeros(len(column), dtype=bool)
+    step = np.abs(np.diff(column))
+    for a, b in _spans(step == 0.0):
+        if b - a + 1 <= channel.longest:
+            continue
+        around = np.concatenate([step[max(a - _AROUND, 0) : a], step[b : b + _AROUND]])
+        if around.size and float(np.median(around)) > _DIGITS * channel.digit > 0.0:
+            mark[a : b + 1] = True
+    return mark
+
+
+class _Learning:
+    """The first reading of one channel."""
+
+    def __init__(self) -> None:
+        self.kept = np.zeros(0)
+        self.stride, self.count, self.steps, self.equal = 1, 0, 0, 0
+        self.digit = math.inf
+        self.last: float | None = None
+        self.nines: Counter[float] = Counter()
+        self.ends = (_Extreme(1.0), _Extreme(-1.0))
+
+    def feed(self, values: Array) -> None:
+        start = -self.count % self.stride
+        self.kept = np.concatenate([self.kept, values[start :: self.stride]])
+        while self.kept.size > _KEPT:
+            self.kept, self.stride = self.kept[::2], 2 * self.stride
+        self.count += values.size
+        step = np.abs(np.diff(values, prepend=values[:1] if self.last is None else self.last))
+        run_steps = step == 0.0
+        # A repeat counts once a run, so that one stuck stretch does not make repeats usual.
+        self.equal += int((run_steps[1:] & ~run_steps[:-1]).sum())
+        self.steps += int((~run_steps).sum())
+        moving = step[~run_steps]
+        if moving.size:
+            self.digit = min(self.digit, float(moving.min()))
+        self.last = float(values[-1])
+        size = float(np.abs(values).max())
+        if size >= 99.0:
+            for value in np.unique(values[np.abs(values) >= 99.0])[[0, -1]]:
+                if _nines(float(value)):
+                    self.nines[float(value)] += int((values == value).sum())
+        for end in self.ends:
+            end.feed(values)
+
+    def result(self, name: str, stated: Sequence[float]) -> _Channel:
+        channel = _Channel(digit=self.digit if math.isfinite(self.digit) else 0.0)
+        kept = self.kept[~np.isin(self.kept, (*stated, *self.nines))]
+        kept = kept if kept.size else self.kept
+        low, high = (float(np.quantile(kept, q)) for q in _QUANTILES)
+        size = max(abs(low), abs(high))
+        channel.sentinels = (*stated, *(v for v in self.nines if abs(v) > _BEYOND * size))
+        room = max(_FAR * (high - low), 0.01 * size)
+        if size > 0.0 and self.count > _AROUND:
+            channel.low, channel.high = low - room, high + room
+        repeats = min(max(self.equal / max(self.equal + self.steps, 1), 1e-12), 1.0 - 1e-12)
+        channel.longest = max(_RUN, math.ceil(math.log(_CHANCE / max(self.count, 1)) / math.log(repeats)))
+        for end, word in zip(self.ends, ("largest", "smallest"), strict=True):
+            value = end.sign * end.first
+            if end.clipped() and value not in channel.sentinels and channel.low <= value <= channel.high:
+                channel.clipped = f"{end.firsts} of {self.count} samples are the {word} value {value:g}"
+        return channel
+
+
+def usual(pieces: Iterator[Array], names: list[str], missing: Sequence[Sequence[float]]) -> Usual:
+    """Read a history once to learn what its channels are like.
+
+    Parameters
+    ----------
+    pieces : Blocks (rows, channels).
+    names : Of the channels.
+    missing : Stated sentinels of each channel, in its units.
+    """
+    learning = [_Learning() for _ in names]
+    for piece in pieces:
+        for channel, values in zip(learning, piece.T, strict=True):
+            if values.size:
+                channel.feed(values)
+    found = Usual(names)
+    if learning and learning[0].count:
+        found._channels = [one.result(n, list(m)) for one, n, m in zip(learning, names, missing, strict=True)]
+    else:
+        found._channels = [_Channel() for _ in names]
+    return found

@@ -1,0 +1,243 @@
+"""Loads along other axes, about points that move, with buoyancy, lag and faults in them: made from a known law.
+
+Each test writes a record from a law that is known (a load linear in velocity and acceleration), puts one
+habit of a laboratory on it by hand, and asks for the law back.
+"""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from made_campaigns import CONSTANTS, campaign, history
+
+from ident.captive.campaign import read_campaign
+from ident.checks.check import check_campaign
+from sim.files.errors import InputError
+
+RHO, LENGTH, SPEED = 1000.0, 70.2, 2.0
+# The law of the body: X = -R, Y = Yv v + Yvdot vdot, N = Nv v + Nvdot vdot [SI].
+RESISTANCE, YV, YVDOT, NV, NVDOT = 30.0, -400.0, -900.0, -350.0, -30.0
+FREQUENCY, AMPLITUDE = 0.25, 0.3
+OMEGA = 2.0 * math.pi * FREQUENCY
+SWAY = '[source.reduction]\nkind = "oscillatory"\nmotion = "sway"\nfrequency_hz = 0.25\n'
+STRAIGHT = CONSTANTS.replace('test = "drift_horizontal"\n', "").replace('beta = "5 deg"', 'beta = "0 deg"')
+
+
+def record(seconds: float = 80.0, rate: float = 20.0, frequency: float = FREQUENCY, start: float = 0.0) -> pd.DataFrame:
+    """A sway history by the law, with noise of a thousandth."""
+    t = np.arange(int(seconds * rate)) / rate
+    w = 2.0 * math.pi * frequency
+    v, a = AMPLITUDE * w * np.cos(w * t), -AMPLITUDE * w**2 * np.sin(w * t)
+    noise = np.random.default_rng(5).standard_normal((t.size, 3)) * 0.3
+    columns = {"time_s": t + start, "X_N": -RESISTANCE + noise[:, 0], "Y_N": YV * v + YVDOT * a + noise[:, 1]}
+    columns |= {"N_Nm": NV * v + NVDOT * a + noise[:, 2], "displacement_m": AMPLITUDE * np.sin(w * t)}
+    return pd.DataFrame(columns)
+
+
+def law_of(runs: pd.DataFrame) -> tuple[float, float, float, float]:
+    """Yv, Yvdot, Nv, Nvdot of the four instants of a sway cycle."""
+    at = runs.set_index(runs["run_id"].str[-2:])
+    v = (at["U"] * np.sin(at["beta"]))["+v"]
+    a = at["vdot"]["+a"]
+    half = {o: ((at[o]["+v"] - at[o]["-v"]) / 2.0 / v, (at[o]["+a"] - at[o]["-a"]) / 2.0 / a) for o in "YN"}
+    return (*half["Y"], *half["N"])
+
+
+def swayed(folder: Path, table: pd.DataFrame, keys: str = "", reduction: str = SWAY, **tables: str) -> pd.DataFrame:
+    campaign(folder, history("sway.csv", keys, STRAIGHT, reduction), **tables)
+    table.to_csv(folder / "sway.csv", index=False)
+    return read_campaign(folder).runs
+
+
+def assert_law(runs: pd.DataFrame, rel: float = 0.01) -> None:
+    assert law_of(runs) == pytest.approx((YV, YVDOT, NV, NVDOT), rel=rel)
+
+
+# -- the motion ----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("off", [0.0, 0.006, -0.02])
+@pytest.mark.parametrize("measured", [True, False])
+def test_the_records_own_frequency_is_used_and_named(tmp_path, off, measured):
+    table = record(frequency=FREQUENCY * (1.0 + off))
+    table = table if measured else table.drop(columns="displacement_m")
+    reduction = SWAY if measured else SWAY + "amplitude = 0.3\n"
+    assert_law(swayed(tmp_path, table, reduction=reduction))
+    done = read_campaign(tmp_path)
+    found = [f for f in check_campaign(done, tmp_path) if f.check == "motion"]
+    assert bool(found) == bool(off)
+    assert all("0.25 Hz stated" in f.what for f in found)
+
+
+def test_a_frequency_nothing_oscillates_at_is_refused(tmp_path):
+    with pytest.raises(InputError, match="oscillates at"):
+        swayed(tmp_path, record(frequency=0.27))
+
+
+def test_a_frequency_that_is_not_stated_is_found_in_the_displacement(tmp_path):
+    assert_law(swayed(tmp_path, record(), reduction=SWAY.replace("frequency_hz = 0.25\n", "")))
+    with pytest.raises(InputError, match="no frequency"):
+        swayed(tmp_path, record().drop(columns="displacement_m"), reduction=SWAY.replace("frequency_hz = 0.25\n", ""))
+
+
+def test_a_clock_that_does_not_start_at_zero_asks_for_the_phase(tmp_path):
+    late = record(start=36001.3)
+    assert_law(swayed(tmp_path / "a", late))
+    bare = late.drop(columns="displacement_m")
+    with pytest.raises(InputError, match="phase_deg"):
+        swayed(tmp_path / "b", bare, reduction=SWAY + "amplitude = 0.3\n")
+    # The displacement is zero at 36001.3 s, so at time zero of the clock it has this phase.
+    phase = math.degrees(math.remainder(-OMEGA * 36001.3, 2.0 * math.pi))
+    assert_law(swayed(tmp_path / "c", bare, reduction=f"{SWAY}amplitude = 0.3\nphase_deg = {phase:.9f}\n"))
+
+
+def test_a_stated_delay_of_the_load_channels_is_taken_off(tmp_path):
+    table, lag = record(), 0.05
+    t = table["time_s"].to_numpy()
+    w = OMEGA * (t - lag)
+    table["Y_N"] = YV * AMPLITUDE * OMEGA * np.cos(w) - YVDOT * AMPLITUDE * OMEGA**2 * np.sin(w)
+    table["N_Nm"] = NV * AMPLITUDE * OMEGA * np.cos(w) - NVDOT * AMPLITUDE * OMEGA**2 * np.sin(w)
+    assert law_of(swayed(tmp_path / "a", table))[0] != pytest.approx(YV, rel=0.1)
+    assert_law(swayed(tmp_path / "b", table, reduction=SWAY + "delay_s = { Y = 0.05, N = 0.05 }\n"))
+
+
+# -- where the loads are -------------------------------------------------------------------------
+
+
+def test_moments_about_a_point_that_stays_behind_the_swaying_body(tmp_path):
+    """M about the body's point is M - d x F; d along sway gives N + d X."""
+    table = record()
+    table["N_Nm"] -= table["displacement_m"] * table["X_N"]
+    assert law_of(swayed(tmp_path / "a", table))[3] != pytest.approx(NVDOT, rel=0.1)
+    assert_law(swayed(tmp_path / "b", table, keys='moments_about = "fixed"'))
+
+
+@pytest.mark.parametrize("beta", [-12.0, 0.0, 8.0])
+def test_drag_and_side_force_are_turned_to_the_body(tmp_path, beta):
+    """X = -D cos b - S sin b by hand with drag D against the flow and S across it."""
+    b = math.radians(beta)
+    x, y, n = -RESISTANCE, YV * SPEED * math.sin(b), NV * SPEED * math.sin(b)
+    along, across = x * math.cos(b) + y * math.sin(b), -x * math.sin(b) + y * math.cos(b)
+    text = f"run_id,X_N,Y_N,N_Nm\na,{along!r},{across!r},{n!r}\n"
+    for name, axes, aft in (("flow", "flow", False), ("tank", "tank", False), ("aft", "flow", True)):
+        frame = 'x = "forward"\ny = "starboard"\nz = "down"\nangles = "flight"\n'
+        if aft:
+            frame = 'x = "aft"\ny = "starboard"\nz = "up"\nangles = "ittc"\n'
+        signs = (-1.0, 1.0, -1.0) if aft else (1.0, 1.0, 1.0)
+        own = f"run_id,X_N,Y_N,N_Nm\na,{along * signs[0]!r},{across * signs[1]!r},{n * signs[2]!r}\n" if aft else text
+        constants = CONSTANTS.replace("5 deg", f"{-beta if aft else beta} deg") + "rel_sigma = 0.05\n"
+        campaign(tmp_path / name, f'[[source]]\nfiles = "runs.csv"\naxes = "{axes}"\n{constants}', frame=frame)
+        (tmp_path / name / "runs.csv").write_text(own, "utf-8")
+        run = read_campaign(tmp_path / name).runs.iloc[0]
+        assert (run["X"], run["Y"], run["N"]) == pytest.approx((x, y, n), abs=1e-9)
+
+
+def test_loads_of_a_yawing_body_along_the_axes_of_the_tank(tmp_path):
+    """Sampled along axes at rest, where the body turns by 0.3 sin(wt)."""
+    t = np.arange(1600) / 20.0
+    psi = 0.3 * np.sin(OMEGA * t)
+    r, rdot = 0.3 * OMEGA * np.cos(OMEGA * t), -0.3 * OMEGA**2 * np.sin(OMEGA * t)
+    x, y, n = np.full(t.size, -RESISTANCE), 50.0 * r - 20.0 * rdot, -500.0 * r - 900.0 * rdot
+    table = pd.DataFrame({"time_s": t, "X_N": x * np.cos(psi) - y * np.sin(psi)})
+    table["Y_N"] = x * np.sin(psi) + y * np.cos(psi)
+    table["N_Nm"], table["displacement_rad"] = n, psi
+    yaw = SWAY.replace("sway", "yaw")
+    runs = swayed(tmp_path, table, keys='axes = "tank"', reduction=yaw)
+    at = runs.set_index(runs["run_id"].str[-2:])
+    assert at["X"].to_numpy() == pytest.approx(np.full(4, -RESISTANCE), abs=1e-6)
+    assert at["Y"]["+v"] == pytest.approx(50.0 * 0.3 * OMEGA, rel=1e-6)
+    assert at["Y"]["+a"] == pytest.approx(20.0 * 0.3 * OMEGA**2, rel=1e-6)
+    assert at["N"]["+a"] == pytest.approx(900.0 * 0.3 * OMEGA**2, rel=1e-6)
+    with pytest.raises(InputError, match="tank or body"):
+        swayed(tmp_path / "flow", table, keys='axes = "flow"', reduction=yaw)
+
+
+@pytest.mark.parametrize("attitude", ["level", "pitched"])
+def test_buoyancy_is_taken_off_with_its_moment(tmp_path, attitude):
+    """At 4 deg of incidence; B acts 0.5 m ahead of the origin, upwards in the tank."""
+    alpha, force, arm = math.radians(4.0), 9100.0, 0.5
+    pitch = alpha if attitude == "pitched" else 0.0
+    x, z = force * math.sin(pitch), -force * math.cos(pitch)
+    text = f"run_id,X_N,Z_N,M_Nm\na,{-30.0 + x!r},{-20.0 + z!r},{15.0 - arm * z!r}\n"
+    constants = CONSTANTS.replace("drift_horizontal", "drift_vertical").replace('alpha = "0 deg"', 'alpha = "4 deg"')
+    constants = constants.replace("5 deg", "0 deg") + "rel_sigma = 0.05\n"
+    tables = {"hydrostatics": f'force_n = {force}\ncentre_m = [{arm}, 0.0, 0.0]\nattitude = "{attitude}"\nsource = "s"'}
+    campaign(tmp_path, f'[[source]]\nfiles = "runs.csv"\n{constants}', **tables)
+    (tmp_path / "runs.csv").write_text(text, "utf-8")
+    run = read_campaign(tmp_path).runs.iloc[0]
+    assert (run["X"], run["Z"], run["M"]) == pytest.approx((-30.0, -20.0, 15.0), abs=1e-9)
+
+
+# -- samples that are no measurements --------------------------------------------------------------
+
+
+def steady(n: int = 800) -> np.ndarray:
+    return np.array([-30.0, -75.0, -90.0]) + 0.5 * np.random.default_rng(9).standard_normal((n, 3)).round(3)
+
+
+FAULTS = {
+    "one sentinel": (lambda y: y.__setitem__(400, -9999.0), "sentinel"),
+    "one in ten": (lambda y: y.__setitem__(slice(5, None, 10), 9999.0), "sentinel"),
+    "spike": (lambda y: y.__setitem__(333, 812.3), "spike"),
+    "zeros": (lambda y: y.__setitem__(slice(200, 240), 0.0), "stuck"),
+    "single zeros": (lambda y: y.__setitem__([50, 310, 702], 0.0), "spike"),
+    "frozen to the end": (lambda y: y.__setitem__(slice(500, None), y[499]), "stuck"),
+    "at the limit": (lambda y: y.__setitem__(slice(300, 420), -100.0), "stuck"),
+}
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_faults_of_a_channel_are_left_out_and_named(tmp_path, fault):
+    values = steady()
+    spoil, kind = FAULTS[fault]
+    spoil(values[:, 1])
+    campaign(tmp_path, history("run.csv"))
+    table = pd.DataFrame(values, columns=["X_N", "Y_N", "N_Nm"])
+    table.insert(0, "time_s", np.arange(len(table)) * 0.05)
+    table.to_csv(tmp_path / "run.csv", index=False)
+    done = read_campaign(tmp_path)
+    run = done.runs.iloc[0]
+    assert abs(run["Y"] + 75.0) < 4.0 * run["s_Y"]
+    assert run["s_Y"] < 0.06
+    assert f"{kind} samples of Y left out" in run["reduction"]
+    assert {k for k, name in done.reduced[0].left_out if name == "Y"} == {kind}
+    assert {name for _, name in done.reduced[0].left_out} == {"Y"}
+
+
+def test_a_clipped_channel_is_an_error(tmp_path):
+    values = steady()
+    values[:, 1] = np.maximum(values[:, 1], -75.2)
+    campaign(tmp_path, history("run.csv"))
+    table = pd.DataFrame(values, columns=["X_N", "Y_N", "N_Nm"])
+    table.insert(0, "time_s", np.arange(len(table)) * 0.05)
+    table.to_csv(tmp_path / "run.csv", index=False)
+    assert "Y is clipped" in read_campaign(tmp_path).runs["reduction"].iloc[0]
+
+
+@pytest.mark.parametrize("value", [-0.12, 0.21, 1e-7, 3.3e5])
+def test_a_sound_record_loses_nothing(tmp_path, value):
+    """Noise, a constant channel whose block means differ by rounding, a settled one, a slow drift."""
+    values = steady()
+    campaign(tmp_path, history("run.csv"))
+    table = pd.DataFrame(values, columns=["X_N", "Y_N", "N_Nm"])
+    table.insert(0, "time_s", np.arange(len(table)) * 0.05)
+    table["Z_N"] = value
+    table.to_csv(tmp_path / "run.csv", index=False)
+    one = read_campaign(tmp_path).reduced[0]
+    assert not one.left_out
+    assert not one.clipped
+    assert not one.fit.cut
+
+
+def test_a_computed_load_that_settles_is_not_stuck(tmp_path):
+    t = np.arange(1, 1500)
+    y = (-75.0 * (1.0 - np.exp(-t / 40.0) * np.cos(t / 15.0))).round(6)
+    campaign(tmp_path, history("run.csv"))
+    pd.DataFrame({"time_s": t * 1.0, "X_N": -30.0, "Y_N": y, "N_Nm": 1.2 * y}).to_csv(tmp_path / "run.csv", index=False)
+    done = read_campaign(tmp_path)
+    assert not done.reduced[0].left_out
+    assert done.runs["Y"].iloc[0] == pytest.approx(-75.0, rel=1e-3)
