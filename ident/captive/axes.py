@@ -75,15 +75,15 @@ def to_body(runs: pd.DataFrame, chosen: pd.Series, flow: pd.Series) -> pd.DataFr
                 whole[:, i] += np.where(share == 0.0, 0.0, share * np.nan_to_num(values[:, j]))
         out.loc[rows, list(group)] = np.where(np.isnan(values), np.nan, whole)
         errors = [f"s_{o}" for o in group]
-        if all(e in runs for e in errors):
+        if all(error in runs for error in errors):
             squares = np.nan_to_num(runs.loc[rows, errors].to_numpy(float)) ** 2
             carried = np.sqrt(np.einsum("nij,nj->ni", matrix**2, squares))
             out.loc[rows, errors] = np.where(runs.loc[rows, errors].isna().to_numpy(), np.nan, carried)
     for name in out.loc[rows, "exclude"].unique():
-        words = [w for w in str(name).split() if w in OUTPUTS]
+        excluded = [w for w in str(name).split() if w in OUTPUTS]
         for group in GROUPS:
-            own = [w for w in words if w in group]
-            if own and len(own) < len(group) and _mixed(matrix[(out.loc[rows, "exclude"] == name).to_numpy()]):
+            some = [w for w in excluded if w in group]
+            if some and len(some) < len(group) and _mixed(matrix[(out.loc[rows, "exclude"] == name).to_numpy()]):
                 run = out[out["exclude"] == name].iloc[0]
                 text = f"{' '.join(group)} together, or none: a turned load is made of all of them"
                 raise InputError(f"{run['file']}, row {run['row']}, column exclude", repr(name), text)

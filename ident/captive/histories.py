@@ -229,8 +229,14 @@ def reduce(channels: Channels, rule: Reduction, run_id: str, frequency: float | 
         text = f"samples enough for a {rule.kind} fit{window}"
         raise InputError(str(channels.path), f"{error} in {condensed.samples} rows", text) from error
     own = (clock, rule.rate_hz, channels.first_row)
-    left = (dict(faults.counts), faults.clipped, condensed.samples + sum(faults.counts.values()), stated, line)
-    reduced = Reduced(run_id, channels.path.name, names, rule.kind, fit, *own, *left)
+    reduced = replace(
+        Reduced(run_id, channels.path.name, names, rule.kind, fit, *own),
+        left_out=dict(faults.counts),
+        clipped=faults.clipped,
+        samples=condensed.samples + sum(faults.counts.values()),
+        stated_hz=stated,
+        line=line,
+    )
     if rule.kind == "oscillatory":
         return _harmonic_values(names, fit, frequency or 0.0, rule.delay_s), reduced
     values: dict[str, Any] = {}
