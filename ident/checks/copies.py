@@ -195,7 +195,8 @@ def frozen_column(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
         key = _hashed(pd.DataFrame({"test": usable["test"], "value": _rounded(usable[output].to_numpy(float))}))
         tests = count[usable.index].groupby(usable["test"]).agg(["size", "max"])
         least = {t: _beyond_chance(int(n), int(d), rule.limits["chance"]) for t, n, d in tests.itertuples()}
-        many = key.groupby(key).transform("size") >= usable["test"].map(least)
+        # Without any run, pandas takes the map of texts for a column of texts.
+        many = key.groupby(key).transform("size") >= usable["test"].map(least).astype(float)
         for _, group in _again(usable[many], key[many]):
             others = group[[o for o in OUTPUTS if o != output]].notna().any(axis=None)
             same = others and whole[group.index].nunique() == 1
