@@ -14,6 +14,7 @@ everything found so far is carried through each subtraction.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import pandas as pd
@@ -21,7 +22,7 @@ from numpy.typing import NDArray
 
 from ident.captive.campaign import Campaign, tests
 from ident.identification.equations import Runs
-from ident.identification.nodes import Node, table_points
+from ident.identification.nodes import Node, by_coefficient, table_points
 from ident.identification.solver import Solver, check_levers
 from ident.identification.wake import wake_fraction
 from ident.output import Tell, silent
@@ -52,9 +53,13 @@ class Identification:
     unused: list[tuple[str, str, int, str, str]]
     warnings: list[tuple[str, str]]
 
+    @cached_property
+    def _members(self) -> dict[tuple[str, str], list[int]]:
+        return by_coefficient(self.nodes)
+
     def points(self, term: Term, part: str) -> tuple[list[Point], list[int], list[int]]:
         """Measured and mirrored points of a coefficient, their node and sign."""
-        return table_points(self.nodes, term, part, self.campaign.vehicle)
+        return table_points(self.nodes, term, part, self.campaign.vehicle, self._members)
 
 
 def _propulsion_point(solver: Solver, runs: pd.DataFrame) -> None:

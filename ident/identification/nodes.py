@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from sim.boat.catalogue import Term
@@ -40,8 +40,20 @@ def vanishes(term: Term, part: str, vehicle: Vehicle) -> bool:
     return own and mirror.sign < 0 and min(mirror.axis_signs, default=1) > 0
 
 
+def by_coefficient(nodes: Sequence[Node]) -> dict[tuple[str, str], list[int]]:
+    """Numbers of the nodes of every coefficient and part, in order."""
+    found: dict[tuple[str, str], list[int]] = {}
+    for i, node in enumerate(nodes):
+        found.setdefault((node.name, node.part), []).append(i)
+    return found
+
+
 def table_points(
-    nodes: Sequence[Node], term: Term, part: str, vehicle: Vehicle
+    nodes: Sequence[Node],
+    term: Term,
+    part: str,
+    vehicle: Vehicle,
+    members: Mapping[tuple[str, str], list[int]] | None = None,
 ) -> tuple[list[Point], list[int], list[int]]:
     """Points at which a coefficient is known, from runs and by symmetry.
 
@@ -49,6 +61,7 @@ def table_points(
     ----------
     nodes : The values found.
     term, part, vehicle : The coefficient.
+    members : ``by_coefficient`` of the nodes, where it is at hand.
 
     Returns
     -------
@@ -57,14 +70,11 @@ def table_points(
     signs : Coefficient = sign * node; 0 where symmetry makes it zero.
     """
     mirror = mirror_of(term, part, vehicle)
-    points: dict[Point, tuple[int, int]] = {}
-    for i, node in enumerate(nodes):
-        if (node.name, node.part) == (term.name, part):
-            points[node.point] = (i, 1)
-    for i, node in enumerate(nodes):
-        if (node.name, node.part) == (mirror.name, mirror.part):
-            # A mirror undoes itself, so its signs lead back as well.
-            points.setdefault(mirror.point(node.point), (i, mirror.sign))
+    members = members if members is not None else by_coefficient(nodes)
+    points: dict[Point, tuple[int, int]] = {nodes[i].point: (i, 1) for i in members.get((term.name, part), [])}
+    for i in members.get((mirror.name, mirror.part), []):
+        # A mirror undoes itself, so its signs lead back as well.
+        points.setdefault(mirror.point(nodes[i].point), (i, mirror.sign))
     flips = [k for k, s in enumerate(mirror.axis_signs) if s < 0]
     if flips and (mirror.name, mirror.part) == (term.name, part) and mirror.sign < 0:
         for point, (i, _) in list(points.items()):

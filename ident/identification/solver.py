@@ -15,7 +15,7 @@ from ident.captive.campaign import Campaign
 from ident.captive.published import TEST as PUBLISHED
 from ident.captive.run_table import MEASURED
 from ident.identification.equations import ALWAYS, BEYOND, NONZERO, Equations, Form, Note, Runs
-from ident.identification.nodes import Node, key_point, table_points
+from ident.identification.nodes import Node, by_coefficient, key_point, table_points
 from ident.identification.stage_solve import solve_stage
 from sim.boat.catalogue import ACCELERATIONS, OUTPUTS, Term
 from sim.boat.forces import axis_values, boat_features, body_velocity, multiplier, plane_features
@@ -52,6 +52,7 @@ class Solver:
         self.index: dict[tuple[str, str, Point], int] = {}
         self.values: Array = np.zeros(0)
         self.covariance: Array = np.zeros((0, 0))
+        self._members: tuple[int, dict[Key, list[int]]] = (0, {})
         self.tables: dict[Key, tuple[Table, list[int], list[int]]] = {}
         self.unused: list[tuple[str, str, int, str, str]] = []
         self.warnings: list[tuple[str, str]] = []
@@ -88,7 +89,9 @@ class Solver:
         """Table over the points found so far, with the node and sign of each point."""
         key = (term.name, part)
         if key not in self.tables:
-            points, nodes, signs = table_points(self.nodes, term, part, self.vehicle)
+            if self._members[0] != len(self.nodes):
+                self._members = (len(self.nodes), by_coefficient(self.nodes))
+            points, nodes, signs = table_points(self.nodes, term, part, self.vehicle, self._members[1])
             if not points:
                 return None
             rules = tuple(term.extrapolation[a] for a in term.axes)
@@ -296,6 +299,7 @@ class Solver:
         keep = [i for i in range(len(self.nodes)) if i - first not in lost]
         self.nodes = [self.nodes[i] for i in keep]
         self.index = {(n.name, n.part, n.point): i for i, n in enumerate(self.nodes)}
+        self._members = (0, {})
         self.values, self.covariance = self.values[keep], self.covariance[np.ix_(keep, keep)]
 
     def append(self, key: tuple[str, str, Point], value: float, variance: float, row: Array) -> int:

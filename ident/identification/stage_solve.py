@@ -23,8 +23,7 @@ Matrix = Any
 
 # Singular values below this fraction of the largest do not determine anything.
 _RANK = 1e-9
-# Equations up to which matrices are full. What the equations leave of a value that one run alone
-# gives is rounding, which depends on the order of sums, and stored digests hold it.
+# Equations up to which matrices are full: for few, sparse ones are slower.
 _FULL = 2000
 # An equation with this leverage or more has nothing to be compared with.
 _FREE = 1.0 - 1e-9
@@ -93,13 +92,18 @@ def _blocks(design: csr_array) -> Iterator[tuple[Indices, Indices, Array]]:
         order = np.argsort(own, kind="stable")
         members.append(np.split(order, np.searchsorted(own[order], np.arange(1, count))))
     place = np.zeros(n_columns, dtype=np.int64)
+    # All equations in the order of their blocks: each block is a stretch of them.
+    ordered = design[np.concatenate(members[0])] if members[0] else design
+    first = 0
     for r, c in zip(*members, strict=True):
         if c.size:
             place[c] = np.arange(c.size)
-            part = design[r]
+            ends = ordered.indptr[first : first + r.size + 1]
             local = np.zeros((r.size, c.size))
-            local[np.repeat(np.arange(r.size), np.diff(part.indptr)), place[part.indices]] = part.data
+            entry = np.repeat(np.arange(r.size), np.diff(ends))
+            local[entry, place[ordered.indices[ends[0] : ends[-1]]]] = ordered.data[ends[0] : ends[-1]]
             yield r, c, local
+        first += r.size
 
 
 def _null_space(local: Array, rank: int) -> Array:

@@ -147,7 +147,7 @@ def extend_axis(nodes: Array, rule: str) -> tuple[Array, Array]:
 def _line_interpolation(index: tuple[int, ...], axes: Sequence[Array], measured: NDArray[np.bool_]):
     """(node, weight) pairs for a node bracketed by runs along one axis, else None."""
     for k, nodes in enumerate(axes):
-        line = np.moveaxis(measured, k, -1)[(*index[:k], *index[k + 1 :])]
+        line = measured[(*index[:k], slice(None), *index[k + 1 :])]
         below, above = np.flatnonzero(line[: index[k]]), np.flatnonzero(line[index[k] :])
         if below.size and above.size:
             lo, hi = int(below[-1]), int(above[0]) + index[k]
@@ -161,18 +161,18 @@ def _without_interaction(index: tuple[int, ...], known: NDArray[np.bool_]):
     """(node, weight) triple C(a,b0) + C(a0,b) - C(a0,b0) from the nearest known nodes."""
     best, found = None, None
     for j, k in itertools.combinations(range(len(index)), 2):
-        for a in range(known.shape[j]):
-            for b in range(known.shape[k]):
-                if a == index[j] or b == index[k]:
-                    continue
-                distance = abs(a - index[j]) + abs(b - index[k])
-                if best is not None and distance >= best:
-                    continue
-                keep_j, keep_k, neither = list(index), list(index), list(index)
-                keep_j[k], keep_k[j], neither[j], neither[k] = b, a, a, b
-                triple = [tuple(keep_j), tuple(keep_k), tuple(neither)]
-                if all(known[t] for t in triple):
-                    best, found = distance, list(zip(triple, (1.0, 1.0, -1.0), strict=True))
+        plane = known[tuple(slice(None) if m in (j, k) else i for m, i in enumerate(index))]
+        # At (a, b): itself and the two corners it shares with the missing node are known.
+        usable = plane & plane[:, index[k], None] & plane[None, index[j], :]
+        usable[index[j], :] = usable[:, index[k]] = False
+        away = [np.abs(np.arange(n) - i) for n, i in zip(plane.shape, (index[j], index[k]), strict=True)]
+        distance = np.where(usable, np.add.outer(*away), sum(plane.shape) + 1)
+        a, b = (int(i) for i in np.unravel_index(int(distance.argmin()), plane.shape))
+        if usable[a, b] and (best is None or distance[a, b] < best):
+            keep_j, keep_k, neither = list(index), list(index), list(index)
+            keep_j[k], keep_k[j], neither[j], neither[k] = b, a, a, b
+            triple = [tuple(keep_j), tuple(keep_k), tuple(neither)]
+            best, found = int(distance[a, b]), list(zip(triple, (1.0, 1.0, -1.0), strict=True))
     return found
 
 
