@@ -54,8 +54,8 @@ def engine(where: str, doing: str, allowed: str) -> Iterator[None]:
     ) as error:
         raise InputError(where, f"{doing}: {brief(error)}", allowed) from error
     except BaseException as error:
-        # A panic of native code is no ``Exception``.
-        if type(error).__name__ != "PanicException":
+        # A panic of native code is no ``Exception``; early releases of the engine throw one without a kind.
+        if type(error) is not Exception and type(error).__name__ != "PanicException":
             raise
         raise InputError(where, f"{doing}: {brief(error)}", allowed) from error
 
