@@ -2,35 +2,75 @@
 
 from __future__ import annotations
 
-from typing import Any
+import os
+import signal
+import sys
+from typing import Any, NoReturn
 
 import click
 
 from ident import __version__
 from ident.commands import animate, campaigns, doctor, flights, maneuvers, start, trials, versions
+from ident.commands.process import Terminated, ends_when_asked, ready_streams, silence
+from ident.commands.shared import inputs_kept
+from ident.text import visible
 
 
 class Commands(click.Group):
-    """Turns a user's mistake into one message and exit code 2."""
+    """Turns a user's mistake into one message and exit code 2, and ends when asked."""
+
+    def main(self, *args: Any, **kwargs: Any) -> Any:
+        """Run the program: streams that take every character, signals that end it anywhere."""
+        ready_streams()
+        with ends_when_asked():
+            return super().main(*args, **kwargs)
 
     def invoke(self, ctx: click.Context) -> Any:
-        """Run a command; ``InputError`` becomes a message."""
+        """Run a command; ``InputError`` and what the system refuses become a message."""
         try:
-            return super().invoke(ctx)
+            if not _stands_somewhere():
+                _refuse(ctx, "the working folder", "no longer there", "a folder that exists")
+            found = super().invoke(ctx)
+            # What cannot be written shows here at the latest, not when Python ends.
+            sys.stdout.flush()
+            return found
         except BrokenPipeError:
+            silence("stdout")
             ctx.exit(1)
         except (click.exceptions.Exit, click.ClickException):
             raise
+        except (KeyboardInterrupt, Terminated) as asked:
+            click.echo("\nInterrupted." if isinstance(asked, KeyboardInterrupt) else "\nTerminated.", err=True)
+            ctx.exit(128 + (signal.SIGINT if isinstance(asked, KeyboardInterrupt) else signal.SIGTERM))
+        except MemoryError:
+            _refuse(ctx, "memory", "more was asked for than there is", "smaller files, fewer samples, shorter runs")
+        except OSError as error:
+            silence("stdout")
+            text, where = error.strerror or str(error), error.filename or "standard output, or a file"
+            _refuse(ctx, str(where), text, "what you may read and write, with room for it")
         except Exception as error:
             # Imported only now: the help of a command has no need of it.
             from sim.files.errors import InputError
 
             if not isinstance(error, InputError):
                 raise
-            click.secho(f"Error: {error.where}", fg="red", err=True)
-            click.echo(f"  found:   {error.found}", err=True)
-            click.echo(f"  allowed: {error.allowed}", err=True)
-            ctx.exit(2)
+            _refuse(ctx, error.where, error.found, error.allowed)
+
+
+def _stands_somewhere() -> bool:
+    try:
+        os.getcwd()
+    except FileNotFoundError:
+        return False
+    return True
+
+
+def _refuse(ctx: click.Context, where: str, found: str, allowed: str) -> NoReturn:
+    """One message, exit code 2."""
+    click.secho(f"Error: {visible(where)}", fg="red", err=True)
+    click.echo(f"  found:   {visible(found)}", err=True)
+    click.echo(f"  allowed: {visible(allowed)}", err=True)
+    ctx.exit(2)
 
 
 @click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"]})
@@ -51,7 +91,7 @@ def main() -> None:
 for _module in (start, campaigns, maneuvers, trials, flights, animate, versions, doctor):
     for _command in vars(_module).values():
         if isinstance(_command, click.Command):
-            main.add_command(_command)
+            main.add_command(inputs_kept(_command))
 
 
 if __name__ == "__main__":

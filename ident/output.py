@@ -3,9 +3,14 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import glob
 import os
 import platform
+import shutil
+import stat
+import sys
+import tempfile
 from collections.abc import Callable, Iterable, Iterator
 from html import escape
 from pathlib import Path
@@ -28,24 +33,88 @@ def check_folder(path: Path) -> None:
     """Refuse a folder that cannot be written to or made. Raises ``InputError``."""
     from sim.files.errors import InputError
 
-    if path.exists() and not path.is_dir():
-        raise InputError(str(path), "a file", "a folder to write to")
-    above = next(p for p in (path, *path.absolute().parents) if p.exists())
-    if not above.is_dir():
-        raise InputError(str(path), f"{above} is a file", "a folder to write to")
-    if not os.access(above, os.W_OK | os.X_OK):
-        raise InputError(str(path), f"{above} may not be written to", "a folder you may write to")
+    with _as_message(path):
+        if path.exists() and not path.is_dir():
+            raise InputError(str(path), "a file", "a folder to write to")
+        above = next(p for p in (path, *path.absolute().parents) if p.exists())
+        if not above.is_dir():
+            raise InputError(str(path), f"{above} is a file", "a folder to write to")
+        if not os.access(above, os.W_OK | os.X_OK):
+            raise InputError(str(path), f"{above} may not be written to", "a folder you may write to")
 
 
 def check_file(path: Path) -> None:
     """Refuse a file that cannot be written. Raises ``InputError``."""
     from sim.files.errors import InputError
 
-    if path.is_dir():
-        raise InputError(str(path), "a folder", "a file to write")
-    check_folder(path.parent)
-    if path.exists() and not os.access(path, os.W_OK):
-        raise InputError(str(path), "a file that may not be written to", "a file you may write to")
+    with _as_message(path):
+        if path.is_dir():
+            raise InputError(str(path), "a folder", "a file to write")
+        if _stream_of(path) is None and not _is_fed(path):
+            check_folder(_target(path).parent)
+        if path.exists() and not os.access(path, os.W_OK):
+            raise InputError(str(path), "a file that may not be written to", "a file you may write to")
+
+
+@contextlib.contextmanager
+def _as_message(path: Path) -> Iterator[None]:
+    """What the file system refuses becomes an ``InputError``."""
+    from sim.files.errors import InputError
+
+    try:
+        yield
+    except OSError as error:
+        text = "a pipe that nobody reads" if error.errno == errno.ENXIO else error.strerror or str(error)
+        raise InputError(str(path), f"cannot be written: {text}", "a path you may write to") from error
+
+
+def _target(path: Path) -> Path:
+    """Where a file goes: a link stays, and what it points to is written."""
+    return Path(os.path.realpath(path)) if path.is_symlink() else path
+
+
+def _stream_of(path: Path) -> int | None:
+    """1 or 2 when the path is this process's own standard output or error, as /dev/stdout is."""
+    for stream in (1, 2):
+        with contextlib.suppress(OSError):
+            if os.path.samestat(path.stat(), os.fstat(stream)) and not stat.S_ISCHR(os.fstat(stream).st_mode):
+                return stream
+    return None
+
+
+def _is_fed(path: Path) -> bool:
+    """Whether a path is a device or a pipe, which takes what is written and is never replaced.
+
+    Raises
+    ------
+    sim.files.errors.InputError
+        For a disk or a socket.
+    """
+    from sim.files.errors import InputError
+
+    try:
+        mode = path.stat().st_mode
+    except FileNotFoundError:
+        return False
+    if stat.S_ISBLK(mode) or stat.S_ISSOCK(mode):
+        raise InputError(str(path), "a disk" if stat.S_ISBLK(mode) else "a socket", "a file, a device or a pipe")
+    return stat.S_ISCHR(mode) or stat.S_ISFIFO(mode)
+
+
+def _feed(path: Path, part: Path) -> None:
+    """Hand a finished file to a device or a pipe, or to standard output where the path is that."""
+    stream = _stream_of(path)
+    if stream is not None:
+        sys.stdout.flush()
+        # What stands there already stays: the place in the file is that of standard output.
+        handle = os.dup(stream)
+    else:
+        # A pipe that nobody reads would be waited for without end.
+        handle = os.open(path, os.O_WRONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_NOCTTY", 0))
+        if hasattr(os, "set_blocking"):
+            os.set_blocking(handle, True)
+    with part.open("rb") as source, open(handle, "wb") as sink:
+        shutil.copyfileobj(source, sink)
 
 
 def _remove_left(path: Path) -> None:
@@ -70,29 +139,63 @@ def is_alive(process: int) -> bool:
     return True
 
 
+def _begin(part: Path, like: Path) -> None:
+    """Make the empty file that is to take the place of ``like``, with its mode and owner.
+
+    Never through a link that someone else put there.
+    """
+    with contextlib.suppress(FileNotFoundError):
+        part.unlink()
+    try:
+        old = like.stat()
+    except FileNotFoundError:
+        os.close(os.open(part, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666))
+        return
+    os.close(os.open(part, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600))
+    if hasattr(os, "chown"):
+        # Only the superuser may give a file away; a group of one's own, everybody.
+        for owner, group in ((old.st_uid, -1), (-1, old.st_gid)):
+            with contextlib.suppress(OSError):
+                os.chown(part, owner, group)
+    part.chmod(stat.S_IMODE(old.st_mode))
+
+
 @contextlib.contextmanager
 def whole(path: Path) -> Iterator[Path]:
     """A file beside ``path``, of the same suffix, that takes its place once it is written.
+
+    A link stays a link, and the file it points to is written. The mode of a file that is there is
+    kept; a new one has what the user's mask leaves. A device and a pipe, standard output among them,
+    are not replaced: they are handed the finished file.
 
     Raises
     ------
     sim.files.errors.InputError
         When it cannot be written; nothing is left then.
     """
+    from sim.files import inputs
     from sim.files.errors import InputError
 
-    part = path.with_name(f".{path.stem}.{_HOST}.{os.getpid()}{path.suffix}")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        _remove_left(path)
-        yield part
-        part.replace(path)
-    except OSError as error:
-        text = f"cannot be written: {error.strerror or error}"
-        raise InputError(str(path), text, "a path you may write to") from error
-    finally:
-        with contextlib.suppress(OSError):
-            part.unlink()
+    if inputs.is_read(path):
+        raise InputError(str(path), "an input of this command", "another file to write to")
+    with _as_message(path):
+        if _stream_of(path) is not None or _is_fed(path):
+            with tempfile.TemporaryDirectory() as folder:
+                part = Path(folder) / f"part{path.suffix}"
+                yield part
+                _feed(path, part)
+            return
+        target = _target(path)
+        part = target.with_name(f".{target.stem}.{_HOST}.{os.getpid()}{target.suffix}")
+        try:
+            target.parent.mkdir(parents=True, exist_ok=True)
+            _remove_left(target)
+            _begin(part, target)
+            yield part
+            part.replace(target)
+        finally:
+            with contextlib.suppress(OSError):
+                part.unlink()
 
 
 class Results(tuple[T, ...]):

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from ident.analysis.derivatives import loads, prime_scale, slope, steps
 from ident.output import html_table
+from ident.text import on_screen
 from sim.boat.catalogue import OUTPUTS, STATES
 from sim.boat.coefficients import Coefficients
 from sim.boat.database import read_rows
@@ -388,7 +389,7 @@ def show(found: StabilityMap, console: Console) -> None:
     table = Table(
         *("U [m/s]", "D0 [m]", "Gv", "Gh", "neutral point v, h [L]", "critical speed stern, sail [m/s]"),
         *("vertical [1/s]", "horizontal [1/s]"),
-        title=f"{found.title}, database version {found.version}",
+        title=on_screen(f"{found.title}, database version {found.version}"),
     )
 
     def speed(value: float | None) -> str:

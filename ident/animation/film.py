@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from ident.animation.silhouette import Silhouette, from_above, from_the_side, silhouette
 from ident.output import whole
+from ident.text import in_figure
 from ident.validation.figures import FRAME, readable
 from sim.files.errors import InputError
 from sim.flight.simulate import Simulation
@@ -224,7 +225,7 @@ def _strip(scene: _Scene, axis: Any, channels: list[str], last: bool) -> None:
     extent = np.concatenate([readable(c, scene.record[c][_shown(scene)])[0] for c in channels])
     for k, (_, name, _) in enumerate(drawn):
         colour = _COLOURS[k % len(_COLOURS)] if len(drawn) > 1 else "tab:red"
-        moving.append(scene.moves(axis.plot([], [], color=colour, lw=1.2, label=name)[0]))
+        moving.append(scene.moves(axis.plot([], [], color=colour, lw=1.2, label=in_figure(name))[0]))
     dots = scene.moves(axis.plot([], [], "o", color="k", ms=3)[0])
     room = 0.08 * max(float(np.ptp(extent)), 0.02 * float(np.abs(extent).max()), 0.05)
     axis.set(xlim=(t[0], t[-1]), ylim=(extent.min() - room, extent.max() + room))
@@ -271,7 +272,7 @@ def _figure(scene: _Scene, planes: list[str], title: str, fps: float) -> Any:
     plan.set_title("from above: track and heading", loc="left", fontsize=9, pad=3)
 
     def update(i: int) -> bool:
-        head.set_text(f"{title}\nt = {flight['t'][i]:.1f} s, {pace:.3g} times real time")
+        head.set_text(f"{in_figure(title)}\nt = {flight['t'][i]:.1f} s, {pace:.3g} times real time")
         return False
 
     scene.update.append(update)

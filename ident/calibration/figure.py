@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from ident.text import in_figure
+
 
 def prior_and_posterior(summary: dict[str, Any], stamp: str) -> str:
     """Prior, posterior and captive range of each multiplier, as an SVG ``data:`` address.
@@ -32,10 +34,11 @@ def prior_and_posterior(summary: dict[str, Any], stamp: str) -> str:
         colour = "#a3161d" if group["beyond_captive"] else "#1d6b36"
         axes.errorbar(after["value"], y - 0.16, xerr=after["sigma"], fmt="s", color=colour, ms=4, lw=1.6)
     axes.axvline(1.0, color="0.6", lw=0.8, zorder=0)
-    axes.set_yticks(place, [g["name"].replace("_", " ") for g in groups])
+    axes.set_yticks(place, [in_figure(g["name"].replace("_", " ")) for g in groups])
     axes.set_xlabel("multiplier on the captive coefficients [-] (offsets: prime form)")
     axes.set_title(
-        f"Prior (grey), posterior (green; red: beyond captive), two captive standard errors (bar)\n{stamp}", fontsize=9
+        f"Prior (grey), posterior (green; red: beyond captive), two captive standard errors (bar)\n{in_figure(stamp)}",
+        fontsize=9,
     )
     axes.grid(axis="x", color="0.92")
     stream = io.BytesIO()

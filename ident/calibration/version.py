@@ -18,6 +18,7 @@ from ident.calibration.file import Parameter, apply, load_calibration, parameter
 from ident.database.lock import WAIT
 from ident.database.store import commit, digest
 from ident.output import html_table
+from ident.text import on_screen
 from sim.boat.database import NUMBERS, Version, column_order, own_version, read_rows, versions
 from sim.boat.row_codec import correlation_matrix, correlation_texts
 from sim.boat.vehicle import load_vehicle
@@ -360,12 +361,12 @@ def show(done: Calibrated, console: Console) -> None:
 
     summary = done.summary
     table = Table("group", "prior", "captive error", "posterior", "maneuvers alone", "verdict")
-    table.title = f"{summary['calibration']}: multipliers on version {summary['parent']}"
+    table.title = on_screen(f"{summary['calibration']}: multipliers on version {summary['parent']}")
     for g in summary["groups"]:
         alone, prior, after = g["maneuvers_alone"], g["prior"], g["posterior"]
         colour = "red" if g["beyond_captive"] else "green"
         table.add_row(
-            g["name"],
+            on_screen(g["name"]),
             f"{prior['mean']:.2f} ± {prior['sigma']:.2f}",
             f"± {g['captive_sigma']:.2f}",
             f"[{colour}]{after['value']:.3f} ± {after['sigma']:.3f}[/]",
@@ -375,13 +376,16 @@ def show(done: Calibrated, console: Console) -> None:
     console.print(table)
     table = Table("case", "source", "channel", "RMSE", "sigma", title="Training series, units of the references")
     for s in summary["series"]:
-        table.add_row(s["case"], s["source"], s["channel"], f"{s['rmse']:.4g}", f"{s['sigma']:.4g}")
+        table.add_row(
+            *(on_screen(s[k]) for k in ("case", "source", "channel")), f"{s['rmse']:.4g}", f"{s['sigma']:.4g}"
+        )
     console.print(table)
     for one in summary["left_out"]:
         errors = ", ".join(
             f"{k} {v:.3g} ({one['rmse_trained'][k]:.3g} trained)" for k, v in one["rmse_predicted"].items()
         )
-        console.print(f"left out {one['case']} {one['source']}, predicted RMSE: {errors}", highlight=False)
+        text = f"left out {one['case']} {one['source']}, predicted RMSE: {errors}"
+        console.print(on_screen(text), highlight=False)
     for text in summary["warnings"]:
         console.print(f"[yellow]warning[/] {escape(text)}", highlight=False)
     state = "committed" if done.new else "unchanged, nothing committed: already"

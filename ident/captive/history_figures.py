@@ -9,6 +9,7 @@ import numpy as np
 
 from ident.captive.histories import Reduced
 from ident.output import whole
+from ident.text import in_figure
 
 _UNITS = {**dict.fromkeys("XYZ", "N"), **dict.fromkeys("KMN", "N m")}
 _POINTS = 2000
@@ -50,7 +51,7 @@ def history_figure(reduced: Reduced, path: Path) -> Path:
         ax.set_title(f"constant part {fit.values[0, c]:.4g} ± {error:.2g}", fontsize=8, loc="right")
     axes[0, 0].legend(loc="upper left", fontsize=8)
     axes[-1, 0].set_xlabel("time [s]")
-    figure.suptitle(f"{reduced.run_id}: {reduced.kind}, {fit.verdict}"[:160], fontsize=9, wrap=True)
+    figure.suptitle(in_figure(f"{reduced.run_id}: {reduced.kind}, {fit.verdict}"[:160]), fontsize=9, wrap=True)
     figure.tight_layout()
     with whole(path) as part:
         figure.savefig(part, dpi=110)

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ident.captive.campaign import Campaign, find_campaigns, read_campaign
+from ident.text import on_screen
 from sim.boat.catalogue import OUTPUTS
 
 if TYPE_CHECKING:
@@ -43,7 +44,7 @@ def show(campaign: Campaign, console: Console) -> None:
     from rich.markup import escape
     from rich.table import Table
 
-    table = Table(title=f"{campaign.vehicle.title}: {campaign.header.name}", title_justify="left")
+    table = Table(title=on_screen(f"{campaign.vehicle.title}: {campaign.header.name}"), title_justify="left")
     for column in ("file", "test", "part", "runs", "loads"):
         table.add_column(column, justify="right" if column == "runs" else "left")
     for (file, test, part), group in campaign.runs.groupby(["file", "test", "part"], sort=False):

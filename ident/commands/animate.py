@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from ident.commands.shared import DB, VERSION, console_for, emit, equilibrium_of, json_to, out_file
+from ident.text import in_file_name, on_screen
 
 
 @click.command()
@@ -79,7 +80,7 @@ def film(
         done = ident.validate(case, db, version, vehicle=vehicle)
     database = done.database
     title = f"{done.case.title}, {done.case.vehicle}; {version_words(database)}"
-    path = out or Path(f"{done.case.name}.gif")
+    path = out or Path(f"{in_file_name(done.case.name)}.gif")
     with Progress(console=console, transient=True) as progress:
         task = progress.add_task("drawing", total=frames)
         draw(
@@ -95,7 +96,7 @@ def film(
             each=lambda: progress.advance(task),
         )
     size = path.stat().st_size
-    console.print(f"animation: {path}, {frames} frames, {size / 1e6:.2g} MB", highlight=False)
+    console.print(f"animation: {on_screen(path)}, {frames} frames, {size / 1e6:.2g} MB", highlight=False)
     if json_path:
         shown = {"case": done.case.name, "database": database, "file": str(path), "frames": frames, "fps": fps}
         emit(shown | {"bytes": size}, json_path)

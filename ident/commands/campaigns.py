@@ -7,13 +7,14 @@ from pathlib import Path
 
 import click
 
-from ident.commands.shared import DB, OUT, WAIT, console_for, emit, json_to, out_file, told
+from ident.commands.shared import DB, MESSAGE, OUT, WAIT, console_for, emit, json_to, out_file, told
+from ident.text import on_screen
 
 
 @click.command()
 @click.argument("folder", type=click.Path(path_type=Path))
 @DB
-@click.option("-m", "--message", default="", help="Message stored with the version.")
+@MESSAGE
 @json_to("Write the summary as JSON.")
 @click.option(
     "--force", default="", metavar="REASON", help="Fit in spite of errors of ident check; the reason is stored."
@@ -55,7 +56,7 @@ def check(folder: Path, json_path: str | None, strict: bool) -> None:
 
     console = console_for(quiet=json_path == "-")
     with console.status("checking") as status:
-        found = ident.check(folder, lambda path: status.update(f"checking {path}"))
+        found = ident.check(folder, lambda path: status.update(f"checking {on_screen(path)}"))
     for one in found:
         show(one.findings, f"{one.campaign.header.name}: {len(one.campaign.runs)} runs", console)
     if json_path:
@@ -85,7 +86,7 @@ def plan(folder: Path, target_rel: float, facility: Path | None, out: Path | Non
     show(made, console)
     if out:
         made.to_csv(out)
-        console.print(f"test matrix: {out}", highlight=False)
+        console.print(f"test matrix: {on_screen(out)}", highlight=False)
     if json_path:
         emit(made.to_dict(), json_path)
 
@@ -112,6 +113,6 @@ def runs(folder: Path, out: Path, json_path: str | None) -> None:
         from ident.captive.history_figures import history_figures
 
         for path in history_figures(histories, out):
-            console.print(f"figure: {path}", highlight=False)
+            console.print(f"figure: {on_screen(path)}", highlight=False)
     if json_path:
         emit([row for campaign in found for row in as_json(campaign)], json_path)

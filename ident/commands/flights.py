@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from ident.commands.shared import DB, VERSION, console_for, emit, equilibrium_of, json_to, out_file
+from ident.text import on_screen
 
 
 @click.command()
@@ -48,7 +49,7 @@ def fly(
     console = console_for(quiet=json_path == "-")
     with equilibrium_of(case), console.status("flying the case"):
         done = fly_to_file(case, db, version, vehicle, out, every, samples, seed or 0, _shares(quantiles))
-    console.print(f"history: {done['file']}, {done['records']} records", highlight=False)
+    console.print(f"history: {on_screen(done['file'])}, {done['records']} records", highlight=False)
     if json_path:
         emit(done, json_path)
 

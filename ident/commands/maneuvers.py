@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ident.commands.shared import DB, OUT, VERSION, WAIT, console_for, emit, equilibrium_of, json_to
+from ident.commands.shared import DB, MESSAGE, OUT, VERSION, WAIT, console_for, emit, equilibrium_of, json_to
+from ident.text import in_file_name, on_screen
 
 if TYPE_CHECKING:
     from ident.validation.result import Validation
@@ -65,6 +66,8 @@ def validate(
              ident validate --case turning-circle --vehicle my_boat.toml
              ident validate --all
     """
+    if case == "":
+        raise click.UsageError("--case is empty; give the name of a case or the path of a case file")
     if (case is None) == (not every):
         raise click.UsageError("give either --case NAME or --all")
     if every and (samples or any(own.values())):
@@ -83,10 +86,10 @@ def validate(
     if samples:
         done = [_with_bands(done[0], samples, seed, dask, console)]
     for one in done:
-        figure = case_figure(one, out / f"{one.case.name}_v{one.version}.png", one.bands)
-        console.print(f"figure: {figure}", highlight=False)
+        figure = case_figure(one, out / f"{in_file_name(one.case.name)}_v{one.version}.png", one.bands)
+        console.print(f"figure: {on_screen(figure)}", highlight=False)
     for figure in _sea_figures(done, out):
-        console.print(f"figure: {figure}", highlight=False)
+        console.print(f"figure: {on_screen(figure)}", highlight=False)
     if json_path:
         emit(done[0].to_dict() if board is None else board, json_path)
     if strict and not all(one.passed for one in done):
@@ -133,7 +136,7 @@ def _all(db: str, version: int | None, cases: Path | None, console: Any) -> tupl
     from ident.validation.scoreboard import run_all, show
 
     with console.status("flying") as status:
-        board, done = run_all(db, version, cases, lambda name: status.update(f"flying {name}"))
+        board, done = run_all(db, version, cases, lambda name: status.update(f"flying {on_screen(name)}"))
     show(board, console)
     return done, board
 
@@ -142,7 +145,7 @@ def _all(db: str, version: int | None, cases: Path | None, console: Any) -> tupl
 @click.argument("name", default="bb2")
 @DB
 @VERSION
-@click.option("-m", "--message", default="", help="Message stored with the version.")
+@MESSAGE
 @click.option("--left-out/--no-left-out", default=True, show_default=True, help="Repeat without each source in turn.")
 @json_to("Write priors, posteriors and diagnostics.")
 @WAIT
@@ -163,7 +166,9 @@ def calibrate(
 
     console = console_for(quiet=json_path == "-")
     with console.status("calibrating") as status:
-        done = ident.calibrate(name, db, version, message, left_out, each=status.update, wait=wait)
+        done = ident.calibrate(
+            name, db, version, message, left_out, each=lambda text: status.update(on_screen(text)), wait=wait
+        )
     show(done, console)
     if json_path:
         emit(done.to_dict(), json_path)

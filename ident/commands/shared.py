@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import functools
 import json
+import os
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -19,6 +21,14 @@ WAIT = click.option(
     show_default=True,
     help="Seconds to wait for another writer of the database.",
 )
+
+
+def _as_text(context: click.Context, parameter: click.Parameter, value: str) -> str:
+    """Text of an argument; in a locale that cannot say it, it arrives as bytes in disguise."""
+    return os.fsencode(value).decode("utf-8", "replace")
+
+
+MESSAGE = click.option("-m", "--message", default="", callback=_as_text, help="Message stored with the version.")
 VERSION = click.option("--version", "version", type=int, default=None, help="Database version; latest by default.")
 
 
@@ -35,6 +45,58 @@ def _file(context: click.Context, parameter: click.Parameter, value: Any) -> Any
     if value not in (None, "-"):
         check_file(Path(value))
     return value
+
+
+def _inputs(command: click.Command, values: dict[str, Any]) -> list[Path]:
+    """Files and folders among the arguments that a command reads, its database among them."""
+    read = [str(values[p.name]) for p in command.params if p.name and values.get(p.name) and not _is_written(p)]
+    return [Path(os.path.realpath(path)) for text in read if "://" not in text and (path := Path(text)).exists()]
+
+
+def _is_written(parameter: click.Parameter) -> bool:
+    return parameter.callback in (_file, _folder)
+
+
+def _refuse_inputs(command: click.Command, values: dict[str, Any]) -> None:
+    """Refuse to write over what a command reads. Raises ``InputError``."""
+    from sim.files.errors import InputError
+
+    inputs = _inputs(command, values)
+    database = Path(os.path.realpath(values["db"])) if values.get("db") and "://" not in values["db"] else None
+    for parameter in command.params:
+        given = values.get(parameter.name or "")
+        if not _is_written(parameter) or given in (None, "-"):
+            continue
+        target = Path(os.path.realpath(given))
+        if database and (target == database or database in target.parents):
+            raise InputError(str(given), "a place inside the database", "a file or folder outside of it")
+        if parameter.callback is _folder or not target.is_file():
+            continue
+        for one in inputs:
+            inside = one in target.parents and target.suffix.lower() not in _RESULTS
+            if (one.is_file() and target.samefile(one)) or inside:
+                raise InputError(str(given), "an input of this command", "another file to write to")
+
+
+# What the program writes and no campaign consists of: may be written again in a campaign's folder.
+_RESULTS = (".json", ".png", ".html", ".gif", ".mp4")
+
+
+def inputs_kept(command: click.Command) -> click.Command:
+    """The command, which refuses to write over what it reads before it begins."""
+    run = command.callback
+    assert run is not None
+
+    @functools.wraps(run)
+    def kept(**values: Any) -> Any:
+        from sim.files import inputs
+
+        _refuse_inputs(command, values)
+        inputs.begin()
+        return run(**values)
+
+    command.callback = kept
+    return command
 
 
 # Where a command writes is looked at before it works: a calibration of minutes must not end at a wrong path.
@@ -91,19 +153,20 @@ def equilibrium_of(case: str) -> Iterator[None]:
 
 def console_for(quiet: bool = False) -> Any:
     """A rich console; a quiet one where standard output holds JSON."""
-    from rich.console import Console
+    from ident.commands.screen import Screen
 
     # A pipe has no width of its own; tables are cut less when it is generous.
-    return Console(quiet=quiet, width=None if sys.stdout.isatty() else 140)
+    return Screen(quiet=quiet, width=None if sys.stdout.isatty() else 140)
 
 
 @contextmanager
 def told() -> Iterator[Any]:
     """Shows what a long command does on standard error, with the time left: yields an ``ident.output.Tell``."""
-    from rich.console import Console
     from rich.progress import Progress, TaskID
 
-    with Progress(console=Console(stderr=True), transient=True) as shown:
+    from ident.commands.screen import Screen
+
+    with Progress(console=Screen(stderr=True), transient=True) as shown:
         tasks: dict[str, TaskID] = {}
 
         def tell(what: str, done: int, of: int) -> None:

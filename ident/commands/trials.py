@@ -8,6 +8,7 @@ from typing import Any
 import click
 
 from ident.commands.shared import console_for, emit, json_to, out_file
+from ident.text import on_screen
 
 
 @click.command()
@@ -56,9 +57,9 @@ def trial(
         from ident.trials.figures import trial_figure
 
         for one in done.trials:
-            console.print(f"figure: {trial_figure(one, figures)}", highlight=False)
+            console.print(f"figure: {on_screen(trial_figure(one, figures))}", highlight=False)
     if out is not None:
         write_csv(done, out)
-        console.print(f"metrics: {out}", highlight=False)
+        console.print(f"metrics: {on_screen(out)}", highlight=False)
     if json_path:
         emit(done.to_dict(), json_path)

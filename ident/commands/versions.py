@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from ident.commands.shared import DB, FOLDER, OUT, VERSION, WAIT, console_for, emit, json_to
+from ident.text import on_screen, visible
 
 
 @click.command()
@@ -30,9 +31,9 @@ def report(db: str, version: int | None, vehicle: str | None, out: Path, json_pa
     console = console_for(quiet=json_path == "-")
     done = []
     for name in [vehicle] if vehicle else reported_vehicles(db, version):
-        with console.status(f"drawing every coefficient of {name}"):
+        with console.status(f"drawing every coefficient of {on_screen(name)}"):
             done.append(write_report(db, version, out, name))
-        console.print(f"report: {done[-1]['file']}", highlight=False)
+        console.print(f"report: {on_screen(done[-1]['file'])}", highlight=False)
     if json_path:
         emit(done[0] if len(done) == 1 else done, json_path)
 
@@ -56,7 +57,7 @@ def versions(db: str, json_path: str | None) -> None:
     if json_path != "-":
         table = Table(*found[0])
         for row in found:
-            table.add_row(*[str(x)[:16] if k == "digest" else str(x) for k, x in row.items()])
+            table.add_row(*[on_screen(str(x)[:16] if k == "digest" else x) for k, x in row.items()])
         console_for().print(table)
 
 
@@ -88,7 +89,7 @@ def diff(first: int, second: int, db: str, json_path: str | None) -> None:
     for one in found:
         change = f"{100 * one.largest_relative_change:.3g} %"
         counts = [str(n) for n in (one.added, one.removed, one.changed)]
-        table.add_row(one.coefficient, *counts, change, f"{one.largest_change_in_stderr:.2f}")
+        table.add_row(on_screen(one.coefficient), *counts, change, f"{one.largest_change_in_stderr:.2f}")
     console_for().print(table)
 
 
@@ -108,7 +109,7 @@ def export(folder: Path, kind: str, db: str, version: int | None, json_path: str
 
     done = run(db, version, kind, folder)
     if json_path != "-":
-        click.echo(done["file"])
+        click.echo(visible(done["file"]))
     if json_path:
         emit(done, json_path)
 
@@ -133,7 +134,7 @@ def vacuum(db: str, wait: float, dry_run: bool, json_path: str | None) -> None:
     if json_path != "-":
         verb = "would be removed" if dry_run else "removed"
         for name, size in found.items():
-            click.echo(f"{verb}: {name} ({size} bytes)")
+            click.echo(f"{verb}: {visible(name)} ({size} bytes)")
         click.echo(f"{len(found)} files of commits that did not finish, {sum(found.values())} bytes")
     if json_path:
         files = [{"file": name, "bytes": size} for name, size in found.items()]

@@ -17,7 +17,7 @@ from ident.identification.identify import identify
 from sim.boat.database import check_digests, column_order, digest, matches, open_table, stored_rows
 from sim.boat.delta_log import LATEST, LOG, Log, Version, latest_said
 from sim.files.errors import InputError
-from sim.files.storage import Storage, engine
+from sim.files.storage import Storage, address, engine
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -292,7 +292,7 @@ def _parquet(rows: pd.DataFrame) -> bytes:
     from deltalake import write_deltalake
 
     with tempfile.TemporaryDirectory() as folder, engine(folder, "cannot be written", "room for temporary files"):
-        write_deltalake(folder, arrow(rows[column_order()]), mode="error", configuration=FOR_EVER)
+        write_deltalake(address(folder), arrow(rows[column_order()]), mode="error", configuration=FOR_EVER)
         return next(Path(folder).glob("*.parquet")).read_bytes()
 
 

@@ -32,7 +32,7 @@ from sim.boat.delta_log import LATEST, LOG, Entry, Log, has_versions, latest_sai
 from sim.boat.parts import parts_of, vehicle_terms
 from sim.boat.row_codec import correlation_texts
 from sim.files.errors import InputError
-from sim.files.storage import brief, engine, flush, is_url
+from sim.files.storage import address, brief, engine, flush, is_url
 
 # Delta Lake's own housekeeping would delete the log of old versions, and then their data.
 FOR_EVER = {
@@ -149,6 +149,7 @@ def commit(path: str, rows: pd.DataFrame, metadata: dict[str, str], wait: float 
     _check_finite(rows, path)
     if is_url(path):
         return _commit(path, rows, metadata, wait)
+    address(path)
     local = Path(path)
     if local.exists() and not local.is_dir():
         raise InputError(path, "a file", "a folder for the database")
@@ -235,7 +236,7 @@ def _written(path: str, rows: pd.DataFrame, said: dict[str, str], how: dict[str,
     with engine(path, "the version cannot be written", "room, and a path you may write to"):
         try:
             write_deltalake(
-                path,
+                address(path),
                 arrow(rows),
                 commit_properties=CommitProperties(custom_metadata=said),
                 post_commithook_properties=PostCommitHookProperties(cleanup_expired_logs=False),

@@ -19,6 +19,7 @@ from ident.database.store import commit, database_rows, digest
 from ident.fitting.notes import group_unused, group_warnings
 from ident.identification.identify import Identification, identify
 from ident.output import Results, Tell, html_table, silent
+from ident.text import on_screen
 from sim.files.errors import InputError
 
 if TYPE_CHECKING:
@@ -222,7 +223,7 @@ def show(done: Fit, console: Console) -> None:
     serious = [f for f in done.findings if f.severity != "info"]
     if serious:
         console.print(findings_table(serious, f"Quality checks: {len(serious)} of {len(done.findings)} findings"))
-    table = Table(title=f"{done.campaign.vehicle.title}: {done.campaign.header.name}", title_justify="left")
+    table = Table(title=on_screen(f"{done.campaign.vehicle.title}: {done.campaign.header.name}"), title_justify="left")
     for column, justify in (
         ("coefficient", "left"),
         ("points", "right"),

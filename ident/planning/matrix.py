@@ -15,6 +15,7 @@ import pandas as pd
 from ident.captive.campaign import Campaign, to_full_scale, turn
 from ident.captive.run_table import STATES
 from ident.output import html_table, whole
+from ident.text import on_screen
 from sim.boat.parts import Point
 
 if TYPE_CHECKING:
@@ -181,6 +182,7 @@ def show(plan: Plan, console: Console) -> None:
             f"  {escape(name)}: no run, and none planned; {escape(' or '.join(tests))} gives it", highlight=False
         )
     for (test, part), group in plan.runs.groupby(["test", "part"], sort=False):
-        console.print(f"  {test}, {part}: {len(group)} states, {group['repeats'].sum()} runs", highlight=False)
+        text = f"  {test}, {part}: {len(group)} states, {group['repeats'].sum()} runs"
+        console.print(on_screen(text), highlight=False)
     total = int(plan.runs["repeats"].sum()) if len(plan.runs) else 0
     console.print(f"[bold]{len(plan.runs)} states, {total} runs[/]", highlight=False)

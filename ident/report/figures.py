@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
+from ident.text import in_figure
 from sim.boat import catalogue
 from sim.boat.catalogue import Term
 from sim.boat.parts import vehicle_terms
@@ -201,7 +202,7 @@ def _draw_bars(axes: Axes, panel: Panel, colours: dict[str, str]) -> None:
         error_kw={"elinewidth": 0.9, "capsize": 2},
         height=0.65 if len(rows) > 1 else 0.2,
     )
-    axes.set_yticks(place, [str(p) for p in rows[panel.labels]])
+    axes.set_yticks(place, [in_figure(p) for p in rows[panel.labels]])
     axes.set_ylim(len(rows) - 0.4 if len(rows) > 1 else 0.6, -0.6)
     axes.axvline(0.0, color="#aaaaaa", linewidth=0.7)
     axes.set_xlabel(f"{panel.ylabel} [-]" if panel.labels == "part" else "value [-]")
@@ -223,7 +224,7 @@ def _legend(panels: list[Panel], lines: dict[str, list[float]], colours: dict[st
     rows = pd.concat([p.rows for p in panels])
     for word, colour in colours.items():
         if (rows["quality"] == word).any():
-            handles.append(Line2D([], [], color=colour, marker="o", linestyle="", markersize=5, label=word))
+            handles.append(Line2D([], [], color=colour, marker="o", linestyle="", markersize=5, label=in_figure(word)))
     if (rows["origin"] == "mirror").any():
         style = {"color": "#444444", "markerfacecolor": "white", "linestyle": ""}
         handles.append(Line2D([], [], marker="o", markersize=5, label="port/starboard mirror", **style))  # type: ignore[arg-type]
@@ -296,7 +297,7 @@ def _draw(panels: list[Panel], title: str, stamp: str, colours: dict[str, str]) 
             axes = grid[place]
             axes.set_visible(True)
             # The power of ten stands at the left, so the title goes to the right.
-            axes.set_title(panel.title, loc="right")
+            axes.set_title(in_figure(panel.title), loc="right")
             if panel.x is None:
                 _draw_bars(axes, panel, colours)
             else:
@@ -304,7 +305,7 @@ def _draw(panels: list[Panel], title: str, stamp: str, colours: dict[str, str]) 
         _share_labels(grid, panels, places)
         height = figure.get_figheight()
         figure.legend(handles=handles, loc="lower center", ncols=min(len(handles), _LEGEND_COLUMNS), frameon=False)
-        figure.suptitle(f"{title}\n{stamp}", fontsize=9.5, y=1.0 - 0.1 / height)
+        figure.suptitle(f"{in_figure(title)}\n{in_figure(stamp)}", fontsize=9.5, y=1.0 - 0.1 / height)
         stream = io.BytesIO()
         figure.savefig(stream, format="svg", metadata={"Date": None})
     return "data:image/svg+xml;base64," + base64.b64encode(stream.getvalue()).decode()

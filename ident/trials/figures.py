@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ident.output import whole
+from ident.text import in_figure, in_file_name
 from ident.trials.maneuvers import control_of
 from ident.trials.trial import Trial
 
@@ -212,8 +213,8 @@ def trial_figure(one: Trial, folder: Path) -> Path:
         axes.tick_params(labelsize=8)
     title = one.spec.name or Path(one.recording.file).name
     loading = f", {one.spec.loading}" if one.spec.loading else ""
-    figure.suptitle(f"{title}: {one.maneuver}{loading}", fontsize=10)
-    path = folder / f"{Path(one.recording.file).stem}_trial.png"
+    figure.suptitle(in_figure(f"{title}: {one.maneuver}{loading}"), fontsize=10)
+    path = folder / f"{in_file_name(Path(one.recording.file).stem)}_trial.png"
     with whole(path) as part:
         figure.savefig(part, dpi=130)
     pyplot.close(figure)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ident.text import on_screen
 from ident.trials.criteria import criteria
 from ident.trials.measure import Value
 from ident.trials.spec import TrialFile, load_spec
@@ -161,14 +162,14 @@ def show(done: Trials, console: Console) -> None:
     if done.folder:
         _show_scatter(done, console)
     for file, what in done.refused:
-        console.print(f"[red]refused[/] {file}: {what}", highlight=False)
+        console.print(f"[red]refused[/] {on_screen(f'{file}: {what}')}", highlight=False)
 
 
 def _show_one(one: Trial, console: Console) -> None:
     from rich.markup import escape
     from rich.table import Table
 
-    table = Table("metric", "value", "+-", "unit", title=f"{escape(Path(one.recording.file).name)}: {one.maneuver}")
+    table = Table("metric", "value", "+-", "unit", title=on_screen(f"{Path(one.recording.file).name}: {one.maneuver}"))
     for name, v in one.metrics.items():
         table.add_row(name, *rounded(v.value, v.sigma), v.unit)
     console.print(table)

@@ -13,6 +13,7 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy.special import chdtri
 
+from ident.text import on_screen
 from ident.validation.cluster import over_dask
 from ident.validation.draws import draw, scores
 from sim.boat.coefficients import Coefficients
@@ -344,7 +345,7 @@ def show(found: dict[str, Any], console: Console) -> None:
     table = Table("reference", "channel", "inside 50 %", "inside 95 %", title=f"{found['samples']} samples{failed}")
     for source, channels in found["inside"].items():
         for channel, entry in channels.items():
-            table.add_row(source, channel, f"{100 * entry['50']:.0f} %", f"{100 * entry['95']:.0f} %")
+            table.add_row(on_screen(source), channel, f"{100 * entry['50']:.0f} %", f"{100 * entry['95']:.0f} %")
     console.print(table)
     table = Table("channel", "variance share by coefficient, ± its standard error")
     for channel, shares in found["variance_shares"].items():

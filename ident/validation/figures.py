@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ident.output import whole
+from ident.text import in_figure
 from ident.validation.bands import Bands
 from ident.validation.result import Validation
 from sim.boat.database import version_words
@@ -88,15 +89,15 @@ def _sources(done: Validation) -> list[str]:
 def _line(done: Validation, source: str) -> dict[str, Any]:
     """How a source is drawn."""
     if done.case.reference and source == done.case.reference.published_model:
-        return {"color": "tab:green", "lw": 1.2, "ls": "--", "label": f"published model ({source})"}
+        return {"color": "tab:green", "lw": 1.2, "ls": "--", "label": f"published model ({in_figure(source)})"}
     colour, marker = _STYLE.get(source, ("tab:gray", "^"))
-    return {"color": colour, "marker": marker, "ms": 2.5, "lw": 0.6, "markevery": 4, "label": source}
+    return {"color": colour, "marker": marker, "ms": 2.5, "lw": 0.6, "markevery": 4, "label": in_figure(source)}
 
 
 def _flights(done: Validation) -> list[tuple[Simulation, dict[str, Any]]]:
     main = {"color": "tab:red", "lw": 1.6, "label": "simulated from the database"}
     own = [
-        (flight, {"color": "tab:orange", "lw": 1.2, "ls": "-.", "label": f"simulated as {source} starts"})
+        (flight, {"color": "tab:orange", "lw": 1.2, "ls": "-.", "label": f"simulated as {in_figure(source)} starts"})
         for source, flight in done.as_started.items()
     ]
     return [(done.simulation, main), *own]
@@ -143,7 +144,7 @@ def finish(figure: Any, path: Path, title: str, stamp: str) -> Path:
     -------
     ``path``.
     """
-    figure.suptitle(f"{title}\n{stamp}; {FRAME}", fontsize=10)
+    figure.suptitle(f"{in_figure(title)}\n{in_figure(stamp)}; {FRAME}", fontsize=10)
     with whole(path) as part:
         figure.savefig(part, dpi=120)
     pyplot().close(figure)
@@ -195,7 +196,9 @@ def _grid(done: Validation, axes: Any) -> None:
             axis.plot([p["speed_mps"] for p in points], [p[key] for p in points], marker="o", label=f"D0 = {depth:g} m")
         dress(axis, "speed U [m/s]", label)
     for value in done.case.published:
-        axes[0].axhline(value.value, color="tab:blue", ls="--", lw=1.0, label=f"{value.source} {value.metric}")
+        axes[0].axhline(
+            value.value, color="tab:blue", ls="--", lw=1.0, label=in_figure(f"{value.source} {value.metric}")
+        )
 
 
 def _draw(done: Validation, plt: Any, bands: Bands | None) -> tuple[Any, Any]:

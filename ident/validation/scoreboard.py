@@ -10,6 +10,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ident.text import on_screen
 from ident.validation.boats import Boat, Fleet
 from ident.validation.result import ChannelError, Validation
 from ident.validation.validate import errors, flights, validate
@@ -205,7 +206,8 @@ def _errors_table(board: dict[str, Any]) -> Table:
     for case, source, channel, e in entries(board["cases"]):
         numbers = [_number(e[k]) for k in ("rmse", "parent_rmse", "published_model_rmse")]
         ratios = [_ratio(e[k]) for k in ("ratio", "ratio_to_parent")]
-        table.add_row(case["case"], source, channel, *numbers, *ratios, e["unit"], "yes" if case["trained"] else "no")
+        names = [on_screen(name) for name in (case["case"], source, channel)]
+        table.add_row(*names, *numbers, *ratios, on_screen(e["unit"]), "yes" if case["trained"] else "no")
     return table
 
 
@@ -219,7 +221,9 @@ def _metrics_table(board: dict[str, Any]) -> Table:
             known = [(k, v.get("simulated")) for k, v in case["metrics"].items() if v.get("simulated") is not None]
             text = ", ".join(f"{k} {_number(v)}" for k, v in known[:_METRICS])
             more = len(known) - _METRICS
-            table.add_row(case["case"], (text or "-") + (f", {more} more in --json" if more > 0 else ""))
+            table.add_row(
+                on_screen(case["case"]), (on_screen(text) or "-") + (f", {more} more in --json" if more > 0 else "")
+            )
     return table
 
 
@@ -231,9 +235,9 @@ def show(board: dict[str, Any], console: Console) -> None:
         console.print(without)
     for case in board["cases"]:
         if "failed" in case:
-            console.print(f"[red]{case['case']} not flown: {case['failed']}[/]", highlight=False)
+            console.print(f"[red]{on_screen(case['case'])} not flown: {on_screen(case['failed'])}[/]", highlight=False)
     for name, trained in board["trained_on"].items():
-        console.print(f"{name} trained on: {', '.join(trained) or 'no maneuver'}", highlight=False)
+        console.print(on_screen(f"{name} trained on: {', '.join(trained) or 'no maneuver'}"), highlight=False)
     for kind in KINDS:
         shown, to_parent = (
             "no case" if board[key][kind] is None else f"{board[key][kind]:.2f}"
@@ -244,4 +248,4 @@ def show(board: dict[str, Any], console: Console) -> None:
     at = board["worst_ratio"]
     if at:
         place = f"{at['case']} {at['source']} {at['channel']}"
-        console.print(f"worst ratio: {at['ratio']:.2f} ({place})", highlight=False)
+        console.print(f"worst ratio: {at['ratio']:.2f} ({on_screen(place)})", highlight=False)

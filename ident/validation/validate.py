@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ident.metrics.measure import measured
+from ident.text import on_screen
 from ident.validation.boats import Boat, Fleet
 from ident.validation.coverage import outside_tables
 from ident.validation.result import ChannelError, Validation
@@ -302,22 +303,22 @@ def _number(value: float | None, digits: int = 4) -> str:
 
 def show(done: Validation, console: Console) -> None:
     """Print errors, metrics and use beyond the data as tables."""
-    from rich.markup import escape
     from rich.table import Table
 
-    console.print(f"[bold]{escape(done.case.title)}[/], {version_words(done.database)}")
+    console.print(f"[bold]{on_screen(done.case.title)}[/], {version_words(done.database)}")
     if done.errors:
         table = Table("reference", "channel", "RMSE", "published model", "ratio", "unit", title="Errors")
         for source, channels in done.errors.items():
             for channel, e in channels.items():
                 text = "-" if e.ratio is None else f"[{'green' if e.ratio <= 1 else 'red'}]{e.ratio:.2f}[/]"
-                table.add_row(source, channel, _number(e.rmse), _number(e.published_model_rmse), text, e.unit)
+                numbers = [_number(e.rmse), _number(e.published_model_rmse)]
+                table.add_row(on_screen(source), channel, *numbers, text, on_screen(e.unit))
         console.print(table)
     if done.metrics:
         labels = list(next(iter(done.metrics.values())))
-        table = Table("metric", *labels, title="Metrics (ITTC)")
+        table = Table("metric", *map(on_screen, labels), title="Metrics (ITTC)")
         for metric, values in done.metrics.items():
-            table.add_row(metric, *[_number(values[c]) for c in labels])
+            table.add_row(on_screen(metric), *[_number(values[c]) for c in labels])
         console.print(table)
     _show_grid(done.grid or [], console)
     _show_outside(done, console)

@@ -9,6 +9,7 @@ import pandas as pd
 
 from ident.metrics import seaway
 from ident.metrics.in_waves import BROACHING
+from ident.text import in_file_name
 from ident.validation.result import Validation
 from ident.validation.wave_figures import exceedance_figure, harmonics_figure, seaway_figure, spectrum_figure
 from sim.boat.database import version_words
@@ -26,7 +27,7 @@ def sea_figures(done: Validation, folder: Path) -> list[Path]:
         return []
     database = done.database
     stamp = version_words(database)
-    title, name = f"{done.case.title}, {done.case.vehicle}", f"{done.case.name}_v{database['version']}"
+    title, name = f"{done.case.title}, {done.case.vehicle}", f"{in_file_name(done.case.name)}_v{database['version']}"
     found = done.in_waves.statistics
     met = seaway.encountered(done.simulation.waves, done.simulation, start=found["D0"].start)
     return [

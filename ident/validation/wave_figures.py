@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ident.metrics.exceedance import Side, exceedances, rice_rate
 from ident.metrics.seakeeping import Harmonics, as_published
 from ident.metrics.seaway import Statistics, spectrum, uniform_step
+from ident.text import in_figure
 from ident.validation.figures import DOWNWARDS, dress, finish, pyplot, readable
 from sim.flight.simulate import Simulation
 
@@ -226,7 +227,8 @@ def harmonics_figure(
             label = "simulated from the database, ± 2 s.e."
             axis.errorbar(d, value, yerr=2.0 * error, marker="D", ms=5, capsize=3, label=label, **_OWN)
         for source, rows in reference[reference["channel"] == channel].groupby("source"):
-            style = {"label": str(source), "color": "tab:gray", "marker": "v", "ls": ""} | _STYLES.get(str(source), {})
+            style = {"color": "tab:gray", "marker": "v", "ls": ""} | _STYLES.get(str(source), {})
+            style |= {"label": style.get("label", in_figure(source))}
             axis.errorbar(rows["D0_m"], rows["value"], yerr=2.0 * rows["sigma"], ms=6, capsize=3, **style)
         dress(axis, "depth of the sail top D0 [m]", _LABEL_OF[channel])
         axis.margins(0.08)

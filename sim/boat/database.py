@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 from sim.boat import catalogue, row_codec
 from sim.boat.delta_log import OURS, WHOLE, Log, Version
 from sim.files.errors import InputError
-from sim.files.storage import engine
+from sim.files.storage import address, engine
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -92,7 +92,7 @@ def open_table(path: str, version: int | None = None, log: Log | None = None) ->
         raise InputError(path, text, f"{log.first} to {log.last}; see `ident versions`")
     try:
         with engine(path, "not a coefficient database", OURS):
-            table = DeltaTable(path, version=number)
+            table = DeltaTable(address(path), version=number)
             stored = {f.name: str(f.type) for f in _schema(table)}
     except InputError:
         # An entry that is damaged is named; the engine does not say which.

@@ -10,9 +10,10 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import AfterValidator, Field, field_validator
 
+from sim.files import inputs
 from sim.files.errors import InputError
 from sim.files.frames import PROGRAM, Frame
-from sim.files.schema import Data, FrameData, checked
+from sim.files.schema import Data, FrameData, Name, checked
 
 Vector = Annotated[list[float], Field(min_length=3, max_length=3)]
 
@@ -161,7 +162,7 @@ class Vehicle(Data):
     consequence), shown in the report. Both are relative to the vehicle file.
     """
 
-    name: str
+    name: Name
     title: str
     source: str
     term_set: Literal["reduced", "gertler_hagen", "mmg"]
@@ -246,6 +247,7 @@ def read_toml(name: str | Path, kind: str, named_in: str = "") -> tuple[dict[str
         if named_in:
             raise InputError(named_in, f"{str(name)[:200]!r}: {found}", text)
         raise InputError(str(name)[:200], found, text)
+    inputs.note(path)
     try:
         return tomllib.loads(path.read_text("utf-8")), str(path)
     except (OSError, ValueError, RecursionError) as error:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any, TypeVar
+from typing import Annotated, Any, TypeVar
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import AfterValidator, BaseModel, ConfigDict, ValidationError
 
 from sim.files.errors import InputError, explain
 from sim.files.frames import Frame, FrameError
@@ -14,6 +14,22 @@ class Data(BaseModel):
     """A part of a data file: unknown keys and non-finite numbers are refused."""
 
     model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
+
+
+def _named(name: str) -> str:
+    if not name.strip() or name != name.strip():
+        raise ValueError("a name, without blanks around it")
+    if len(name.encode()) > _LONGEST_NAME:
+        raise ValueError(f"a name of {_LONGEST_NAME} bytes at most")
+    bad = [c for c in name if c in "/\\" or not c.isprintable()]
+    if bad or not name.strip("."):
+        raise ValueError("a name that can stand in the name of a file: no separators, no control characters")
+    return name
+
+
+_LONGEST_NAME = 100
+# Cases and vehicles give files their names.
+Name = Annotated[str, AfterValidator(_named)]
 
 
 class FrameData(Data):

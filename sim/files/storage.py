@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,29 @@ from sim.files.errors import InputError
 def is_url(path: str) -> bool:
     """Whether a database lies in an object store."""
     return "://" in path
+
+
+# What the storage engine takes for something else in the address of a folder, or does not take at all.
+_MISREAD = re.compile(r"[\[\]\\^|\x00-\x1f\x7f\ud800-\udfff]|%[0-9A-Fa-f]{2}")
+
+
+def address(path: str) -> str:
+    """Address of a database for the storage engine: a URL, in which ``#``, ``?`` and blanks are themselves.
+
+    Raises
+    ------
+    InputError
+        For a folder whose name the engine would read as another's.
+    """
+    if is_url(path):
+        return path
+    # Links are followed by the engine too.
+    real = Path(os.path.realpath(path))
+    found = _MISREAD.search(real.as_posix())
+    if found:
+        text = f"{found[0]!r} in the name of a folder, which the storage engine reads as something else"
+        raise InputError(path, text, "a database in a folder named without [ ] | ^ \\ and %20")
+    return real.as_uri()
 
 
 def brief(error: BaseException) -> str:
@@ -66,6 +90,11 @@ class Storage:
     Parameters
     ----------
     path : Folder, or URL of an object store (its options are taken from the environment).
+
+    Raises
+    ------
+    InputError
+        As ``address``, and when an object store cannot be reached.
     """
 
     def __init__(self, path: str) -> None:
@@ -78,6 +107,8 @@ class Storage:
             with engine(path, "cannot be reached", "an object store the storage engine knows"):
                 self._handler = DeltaStorageHandler(path)
                 self._remote = PyFileSystem(self._handler)
+        else:
+            address(path)
 
     @property
     def local(self) -> Path | None:

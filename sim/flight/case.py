@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from sim.boat.vehicle import bundled, read_toml
+from sim.files import inputs
 from sim.files.errors import InputError
 from sim.files.frames import Frame
-from sim.files.schema import Data, FrameData, checked
+from sim.files.schema import Data, FrameData, Name, checked
 from sim.flight.commands import Commands, Event
 
 if TYPE_CHECKING:
@@ -205,7 +206,7 @@ class Tolerance(Data):
 class Case(Data):
     """A maneuver case file. ``maneuver`` names the metrics; zigzags and roll decays need none."""
 
-    name: str
+    name: Name
     title: str
     vehicle: str
     source: str
@@ -321,6 +322,7 @@ def read_series(path: Path, abscissa: Literal["t", "s"], frame: Frame) -> Series
     """
     import pandas as pd
 
+    inputs.note(path)
     try:
         table = pd.read_csv(path, dtype={"source": str, "channel": str, "unit": str})
     except (ValueError, pd.errors.ParserError) as error:

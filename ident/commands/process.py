@@ -1,0 +1,92 @@
+"""What surrounds a command: its streams, and the signals that end it wherever it is."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+import sys
+import threading
+from collections.abc import Iterator
+from types import FrameType
+
+# What an interrupted command has to end by itself [s]: files half-written are removed, locks are left.
+_GRACE = 1.0
+
+
+class Terminated(BaseException):
+    """The process was asked to end (SIGTERM)."""
+
+
+def ready_streams() -> None:
+    """Standard streams that are open and never fail for a character.
+
+    A closed one is a place where everything vanishes; what the terminal's encoding does not have
+    is shown as a question mark.
+    """
+    for number in range(3):
+        try:
+            os.fstat(number)
+        except OSError:
+            # The lowest number that is free is given: this one. No file opened later may take it.
+            os.open(os.devnull, os.O_RDWR)
+    for name in ("stdout", "stderr"):
+        stream = getattr(sys, name)
+        if stream is None:
+            setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))  # noqa: SIM115
+        elif hasattr(stream, "reconfigure"):
+            stream.reconfigure(errors="replace")
+
+
+def silence(name: str) -> None:
+    """Let what is left in a stream that takes nothing more vanish, so that the end of Python does not complain."""
+    with contextlib.suppress(OSError, ValueError, AttributeError):
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, getattr(sys, name).fileno())
+        os.close(nowhere)
+
+
+def _terminate(number: int, frame: FrameType | None) -> None:
+    raise Terminated
+
+
+def _watch(pipe: int, ended: threading.Event) -> None:
+    """End the process when it does not end by itself: a loop in native code does not look at signals."""
+    with os.fdopen(pipe, "rb", buffering=0) as signals:
+        while number := signals.read(1):
+            if number[0] in (signal.SIGINT, signal.SIGTERM) and not ended.wait(_GRACE):
+                os.write(2, (b"\x1b[?25h" if os.isatty(2) else b"") + b"\nEnded.\n")
+                os._exit(128 + number[0])
+
+
+@contextlib.contextmanager
+def ends_when_asked() -> Iterator[None]:
+    """Ctrl-C and SIGTERM end what runs inside within two seconds, in native code and worker threads too.
+
+    The signal raises ``KeyboardInterrupt`` or ``Terminated`` where Python code runs. When a compiled loop or
+    a pool of threads keeps that from happening, the process ends all the same: that is as safe as a kill,
+    which leaves no half-written file under its name and no half version in a database.
+    """
+    if os.name != "posix" or threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    pipe, end = os.pipe()
+    os.set_blocking(end, False)
+    ended = threading.Event()
+    before = signal.signal(signal.SIGTERM, _terminate)
+    told = signal.set_wakeup_fd(end, warn_on_full_buffer=False)
+    threading.Thread(target=_watch, args=(pipe, ended), daemon=True).start()
+    try:
+        yield
+        ended.set()
+    except (KeyboardInterrupt, Terminated):
+        # Python waits for the threads of a pool before it ends; the watch does not.
+        raise
+    except BaseException as error:
+        if getattr(error, "code", 0) not in (128 + signal.SIGINT, 128 + signal.SIGTERM):
+            ended.set()
+        raise
+    finally:
+        signal.set_wakeup_fd(told)
+        signal.signal(signal.SIGTERM, before)
+        os.close(end)
