@@ -147,7 +147,7 @@ def extend_axis(nodes: Array, rule: str) -> tuple[Array, Array]:
 def _line_interpolation(index: tuple[int, ...], axes: Sequence[Array], measured: NDArray[np.bool_]):
     """(node, weight) pairs for a node bracketed by runs along one axis, else None."""
     for k, nodes in enumerate(axes):
-        line = measured[(*index[:k], slice(None), *index[k + 1 :])]
+        line = measured[tuple(slice(None) if m == k else i for m, i in enumerate(index))]
         below, above = np.flatnonzero(line[: index[k]]), np.flatnonzero(line[index[k] :])
         if below.size and above.size:
             lo, hi = int(below[-1]), int(above[0]) + index[k]
