@@ -9,6 +9,7 @@ from ident.validation.bands import Bands, fly_samples, inside, variance_shares
 from ident.validation.draws import draw
 from sim.boat.coefficients import Coefficients
 from sim.boat.row_codec import correlation_matrix
+from sim.files.record import Record, Written
 from sim.flight.case import load_case, load_reference
 from sim.flight.simulate import simulate
 
@@ -87,8 +88,8 @@ def test_reference_made_of_the_middle_of_the_band_lies_inside(short_case, campai
     bands = fly_samples(case, campaign.vehicle, rows, 12)
     reference = load_reference(case, where)
     middle = np.degrees(np.median(bands.channels["theta"], axis=0))
-    reference.data["CFD"]["theta"] = (bands.time, middle, "deg")
-    reference.data["CFD"]["q"] = (bands.time, np.full(bands.time.size, 9.0), "rad/s")
+    reference.data["CFD"]["theta"] = Record.read("theta", bands.time, Written(middle, "deg", None))
+    reference.data["CFD"]["q"] = Record("q", bands.time, np.full(bands.time.size, 9.0), "rad/s")
     found = inside(bands, case, reference)["CFD"]
     assert found["theta"] == {"50": 1.0, "95": 1.0}
     assert found["q"] == {"50": 0.0, "95": 0.0}

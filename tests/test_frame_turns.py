@@ -157,17 +157,18 @@ def test_reference_series_mean_the_same_in_any_frame(tmp_path, frame):
     assert found.data.keys() == expected.data.keys()
     for source, channels in expected.data.items():
         assert found[source].keys() == channels.keys()
-        for channel, (time, value, unit) in channels.items():
-            assert found[source][channel][0].tolist() == time.tolist()
-            assert found[source][channel][1].tolist() == pytest.approx(value.tolist(), rel=1e-15)
-            assert found[source][channel][2] == unit
+        for channel, record in channels.items():
+            assert found[source][channel].abscissa.tolist() == record.abscissa.tolist()
+            assert found[source][channel].value.tolist() == pytest.approx(record.value.tolist(), rel=1e-15)
+            assert found[source][channel].unit == record.unit
 
 
 def test_reference_zigzag_turns_to_port_first_in_the_program_frame():
     """Bow to port first is psi < 0 with z down, and the case's first command has that sign."""
     case, where = load_case("hzz20")
-    time, heading, unit = load_reference(case, where)["EXP"]["psi"]
-    assert unit == "rad"
+    record = load_reference(case, where)["EXP"]["psi"]
+    time, heading = record.abscissa, record.value
+    assert record.unit == "rad"
     assert heading[np.argmax(np.abs(heading) > np.radians(10.0))] < 0.0
     assert np.sign(case.command.dH.first_deg) < 0.0
     assert time[0] == 0.0

@@ -16,6 +16,7 @@ from ident.validation.bands import fly_samples, inside
 from ident.validation.validate import validate
 from sim.boat.coefficients import Coefficients
 from sim.files.errors import InputError
+from sim.files.record import Record
 from sim.flight.case import load_case, load_reference
 from sim.flight.simulate import simulate
 
@@ -120,7 +121,7 @@ def test_track_is_compared_at_equal_path_length(coefficients):
     flown = simulate(case, coefficients)
     along = np.linspace(0.0, flown["s"][-1], 300)
     for channel in ("x", "y"):
-        series = (along, np.interp(along, flown["s"], flown[channel]), "m")
+        series = Record(channel, along, np.interp(along, flown["s"], flown[channel]), "m")
         assert rmse(flown, channel, series, "s") < 1e-9
         assert rmse(flown, channel, series, "t") > 1.0
     speed = np.hypot(np.gradient(flown["x"], flown["t"]), np.gradient(flown["y"], flown["t"]))
@@ -157,8 +158,8 @@ def test_source_with_its_own_start_is_held_against_a_flight_from_there(fitted_db
     assert flights["EXP"]["U"][0] == pytest.approx(4.93)
     reference = load_reference(case, where)
     for source, flight in flights.items():
-        t, u, _ = reference[source]["u"]
-        expected = np.sqrt(np.mean((np.interp(t, flight["t"], flight["u"]) - u) ** 2))
+        u = reference[source]["u"]
+        expected = np.sqrt(np.mean((np.interp(u.abscissa, flight["t"], flight["u"]) - u.value) ** 2))
         assert done.to_dict()["references"][source]["u"]["rmse"] == pytest.approx(expected, rel=1e-9)
     assert done.to_dict()["metrics"]["execute_2_s"]["simulated_as_EXP"] == pytest.approx(flights["EXP"].executes[1, 0])
 
@@ -174,7 +175,7 @@ def test_bands_of_a_source_with_its_own_start_start_there(campaign, rows, tmp_pa
     assert bands.band("u", "95", "EXP")[0] == pytest.approx(own["u"], rel=1e-9)
     assert bands.band("U", "95", "CFD")[0][0] == pytest.approx(5.14444)
     reference = load_reference(case, where)
-    reference.data["EXP"] = {"u": (own["t"], own["u"] + 1.0, "m/s")}
+    reference.data["EXP"] = {"u": Record("u", own["t"], own["u"] + 1.0, "m/s")}
     assert inside(bands, case, reference)["EXP"]["u"] == {"50": 0.0, "95": 0.0}
 
 

@@ -50,15 +50,16 @@ def assert_close(found: dict[str, float | None], published: dict[str, tuple[floa
 @pytest.mark.parametrize("source", list(HZZ20))
 def test_horizontal_zigzag(source):
     case, where = load_case("hzz20")
-    t, psi, _ = load_reference(case, where)[source]["psi"]
-    assert_close(zigzag(t, psi, None, np.radians(20.0), -1, "yaw"), HZZ20[source])
+    psi = load_reference(case, where)[source]["psi"]
+    assert_close(zigzag(psi.abscissa, psi.value, None, np.radians(20.0), -1, "yaw"), HZZ20[source])
 
 
 def test_peak_yaw_rates_of_the_experiment():
     """0.032281, -0.032896, 0.030241 rad/s, each to 4 standard errors."""
     case, where = load_case("hzz20")
     series = load_reference(case, where)["EXP"]
-    found = zigzag(*series["psi"][:2], series["r"][:2], np.radians(20.0), -1, "yaw")
+    psi, r = series["psi"], series["r"]
+    found = zigzag(psi.abscissa, psi.value, (r.abscissa, r.value), np.radians(20.0), -1, "yaw")
     for k, (rate, sigma) in enumerate(((0.032281, 1.1e-4), (0.032896, 1.6e-4), (0.030241, 1.1e-4)), start=1):
         assert np.radians(found[f"peak_yaw_rate_{k}_degps"]) == pytest.approx(rate, abs=4.0 * sigma)
 
@@ -66,16 +67,16 @@ def test_peak_yaw_rates_of_the_experiment():
 @pytest.mark.parametrize("source", list(VZZ10_10KT))
 def test_vertical_zigzag(source):
     case, where = load_case("vzz10-10kt")
-    t, theta, unit = load_reference(case, where)[source]["theta"]
-    assert unit == "deg"
-    assert_close(zigzag(t, np.radians(theta), None, np.radians(10.0), 1, "pitch"), VZZ10_10KT[source])
+    theta = load_reference(case, where)[source]["theta"]
+    assert (theta.shown.unit, theta.unit) == ("deg", "rad")
+    assert_close(zigzag(theta.abscissa, theta.value, None, np.radians(10.0), 1, "pitch"), VZZ10_10KT[source])
 
 
 @pytest.mark.parametrize(("source", "period", "sigma"), [("EXP", 12.684, 0.02), ("HDM", 13.036, 0.011)])
 def test_roll_period(source, period, sigma):
     case, where = load_case("roll-decay")
-    t, phi, _ = load_reference(case, where)[source]["phi"]
-    assert roll_decay(t, phi)["roll_period_s"] == pytest.approx(period, abs=4.0 * sigma)
+    phi = load_reference(case, where)[source]["phi"]
+    assert roll_decay(phi.abscissa, phi.value)["roll_period_s"] == pytest.approx(period, abs=4.0 * sigma)
 
 
 def test_roll_decay_of_a_damped_cosine():

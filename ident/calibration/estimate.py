@@ -29,6 +29,7 @@ from ident.validation.validate import check_reference
 from sim.boat.coefficients import Coefficients
 from sim.boat.vehicle import Vehicle, load_vehicle
 from sim.files.errors import InputError
+from sim.files.record import Record
 from sim.flight.case import Case, Series, load_case, load_reference
 from sim.flight.simulate import Simulation, environment_of, equipped, fly, water_of
 from sim.flight.trim import NoEquilibrium
@@ -196,18 +197,20 @@ def _gap(x: Array, y: Array, other_x: Array, other_y: Array) -> float:
     return float(np.sqrt(np.mean((np.interp(at, x, y) - np.interp(at, other_x, other_y)) ** 2)))
 
 
-def _difference(one: tuple[Array, Array, str], other: tuple[Array, Array, str]) -> float:
-    """Root mean square difference of two records where both exist, in the unit of the first."""
-    return _gap(one[0], one[1], other[0], other[1])
+def _difference(one: Record, other: Record, unit: str) -> float:
+    """Root mean square difference of two records where both exist, in ``unit``."""
+    return _gap(one.abscissa, one.in_unit(unit).value, other.abscissa, other.in_unit(unit).value)
 
 
 def _channel(training: Training, reference: Series, name: str, channel: str, used: Sequence[str]) -> Channel:
-    along, value, unit = reference[training.source][channel]
+    record = reference[training.source][channel]
+    # Sources of one channel share a discrepancy, in one unit: that of the first.
+    unit = next(s[channel].shown.unit for s in reference.data.values() if channel in s)
+    along, (value, _, sigma) = record.abscissa, record.in_unit(unit)
     at = np.linspace(along[0], along[-1], _SAMPLES)
-    sigma = reference.sigma.get(training.source, {}).get(channel)
     against = 0.0
     if training.differs_from and channel in reference[training.differs_from]:
-        gap = _difference(reference[training.source][channel], reference[training.differs_from][channel])
+        gap = _difference(record, reference[training.differs_from][channel], unit)
         against = gap * training.share**0.5
     return Channel(
         key=(name, training.source, channel),

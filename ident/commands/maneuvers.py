@@ -30,6 +30,9 @@ if TYPE_CHECKING:
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Seed of the draws.")
 @click.option("--dask", default=None, metavar="ADDRESS", help="With --samples: fly them on a Dask cluster.")
 @click.option("--vehicle", default=None, help="With --case: bundled vehicle or vehicle file, not the case's.")
+@click.option("--speed", type=click.FloatRange(min=0, min_open=True), default=None, help="With --case: U [m/s].")
+@click.option("--depth", type=click.FloatRange(min=0), default=None, help="With --case: depth of the sail top [m].")
+@click.option("--angle", type=click.FloatRange(0, 90, min_open=True), default=None, help="With --case: planes [deg].")
 @click.option(
     "--reference",
     type=click.Path(path_type=Path),
@@ -63,7 +66,7 @@ def validate(
              ident validate --case hzz20 --samples 1000
              ident validate --case hzz20 --samples 100000 --dask tcp://scheduler:8786
              ident validate --case turn20-4m --reference mine.csv --frame program
-             ident validate --case turning-circle --vehicle my_boat.toml
+             ident validate --case turning-circle --vehicle my_boat.toml --speed 1.5 --angle 15
              ident validate --all
     """
     if case == "":
@@ -71,7 +74,7 @@ def validate(
     if (case is None) == (not every):
         raise click.UsageError("give either --case NAME or --all")
     if every and (samples or any(own.values())):
-        raise click.UsageError("--samples, --vehicle, --reference and --frame go with --case")
+        raise click.UsageError("--samples, --vehicle, --speed, --depth, --angle, --reference, --frame go with --case")
     if cases and not every:
         raise click.UsageError("--cases goes with --all")
     if dask and not samples:

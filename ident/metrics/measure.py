@@ -13,7 +13,7 @@ from ident.metrics import in_waves as sea_cases
 from ident.metrics import turning, vertical
 from ident.metrics.in_waves import InWaves
 from ident.metrics.zigzag import roll_decay, zigzag
-from sim.flight.case import Case, Series, in_radians
+from sim.flight.case import Case, Series
 from sim.flight.simulate import Simulation
 
 Array = NDArray[np.float64]
@@ -43,8 +43,8 @@ def reference_channels(reference: Series, source: str) -> Channels:
     series = reference[source]
     if not series:
         return {}
-    along = next(iter(series.values()))[0]
-    found = {name: np.interp(along, x, in_radians(value, unit)) for name, (x, value, unit) in series.items()}
+    along = next(iter(series.values())).abscissa
+    found = {name: record.at(along) for name, record in series.items()}
     return found | {reference.abscissa: along}
 
 
@@ -187,11 +187,8 @@ def _of_angle(
         series = reference[source]
         if angle not in series or reference.abscissa != "t":
             continue
-        time, value, unit = series[angle]
-        turn = None
-        if rate and rate in series:
-            turn = (series[rate][0], in_radians(series[rate][1], series[rate][2]))
-        columns[_label(case, source)] = measure(time, in_radians(value, unit), turn)
+        turn = (series[rate].abscissa, series[rate].value) if rate and rate in series else None
+        columns[_label(case, source)] = measure(series[angle].abscissa, series[angle].value, turn)
     return columns
 
 
@@ -216,7 +213,8 @@ def _zigzags(case: Case, reference: Series, flights: dict[str, Simulation]) -> d
     for source in _sources(case) if not horizontal else []:
         label = _label(case, source)
         if label in columns and "dz_over_L0" in reference[source]:
-            t, dz, _ = reference[source]["dz_over_L0"]
+            dz = reference[source]["dz_over_L0"]
             execute = columns[label]["execute_2_s"]
-            columns[label]["depth_overshoot_1_m"] = vertical.depth_overshoot(t, dz * length, execute, sense)
+            over = vertical.depth_overshoot(dz.abscissa, dz.value * length, execute, sense)
+            columns[label]["depth_overshoot_1_m"] = over
     return columns

@@ -20,7 +20,7 @@ from sim.boat.coefficients import Coefficients
 from sim.boat.row_codec import correlation_matrix
 from sim.boat.vehicle import Vehicle
 from sim.files.errors import InputError
-from sim.flight.case import Case, Series, in_radians
+from sim.flight.case import Case, Series
 from sim.flight.simulate import DERIVED, columns_of, environment_of, equipped, fly, samples_of, uses_tanks, water_of
 from sim.flight.trim import NoEquilibrium
 from sim.kernel.assemble import Assembly
@@ -235,11 +235,10 @@ def inside(bands: Bands, case: Case, reference: Series) -> dict[str, Any]:
         for channel in case.reference.channels if case.reference else []:
             if channel not in reference[source]:
                 continue
-            time, value, unit = reference[source][channel]
+            time, value = reference[source][channel].abscissa, reference[source][channel].value
             if reference.abscissa == "s":
                 # Path length to time by the median flight.
                 time = np.interp(time, np.nanmedian(bands.own.get(source, bands.channels)["s"], axis=0), bands.time)
-            value = in_radians(value, unit)
             entry = {}
             for level in LEVELS:
                 low, high = (np.interp(time, bands.time, edge) for edge in bands.band(channel, level, source))

@@ -13,6 +13,7 @@ from ident.text import in_figure
 from ident.validation.bands import Bands
 from ident.validation.result import Validation
 from sim.boat.database import version_words
+from sim.files.record import Record
 from sim.flight.simulate import CHANNELS, Simulation
 
 Array = NDArray[np.float64]
@@ -69,6 +70,11 @@ def _shown(values: Array, unit: str) -> tuple[Array, str]:
     return values, unit
 
 
+def _degrees(record: Record) -> Array:
+    """A reference as it is drawn: angles in degrees."""
+    return _shown(record.shown.value, record.shown.unit)[0]
+
+
 def readable(channel: str, values: Array) -> tuple[Array, str, str]:
     """A channel of a simulation for people: angles in degrees, and the name of its axis.
 
@@ -108,8 +114,9 @@ def _series(done: Validation, channel: str, axis: Any, bands: Bands | None) -> N
     along, unit = done.reference.abscissa, _UNITS[channel]
     for source in _sources(done):
         if channel in done.reference[source]:
-            place, value, unit = done.reference[source][channel]
-            axis.plot(place, _shown(value, unit)[0], **_line(done, source))
+            record = done.reference[source][channel]
+            unit = record.shown.unit
+            axis.plot(record.abscissa, _degrees(record), **_line(done, source))
     if bands and along == "t" and channel in bands.channels:
         for level, alpha in (("95", 0.15), ("50", 0.3)):
             low, high = (_shown(edge, _UNITS[channel])[0] for edge in bands.band(channel, level))
@@ -163,8 +170,7 @@ def _track(done: Validation, axis: Any) -> None:
     for source in _sources(done):
         series = done.reference[source]
         if {"x", "y"} <= set(series):
-            place, x, _ = series["x"]
-            axis.plot(np.interp(place, *series["y"][:2]), x, **_line(done, source))
+            axis.plot(series["y"].at(series["x"].abscissa), series["x"].value, **_line(done, source))
     for flight, style in _flights(done):
         axis.plot(flight["y"], flight["x"], **style)
     dress(axis, "transfer y, to starboard [m]", "advance x, ahead [m]")
@@ -235,8 +241,8 @@ def _over_time(done: Validation, channel: str, axis: Any) -> None:
     if done.reference.abscissa == "t":
         for source in _sources(done):
             if channel in done.reference[source]:
-                place, value, own = done.reference[source][channel]
-                axis.plot(place, _shown(value, own)[0], **_line(done, source))
+                record = done.reference[source][channel]
+                axis.plot(record.abscissa, _degrees(record), **_line(done, source))
     for flight, style in _flights(done):
         values, unit = _shown(flight[channel], _UNITS[channel])
         axis.plot(flight["t"], values, **style)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 from ident.output import html_table
@@ -75,6 +75,8 @@ class Validation:
     in_waves : Harmonics or statistics of a flight in waves.
     passed : Whether the run is complete and every tolerance of the case is met.
     bands : Error bands from sampled coefficients; None when none were flown.
+    saturated : Actuators that lay at their limit: ``actuator``, ``limit``, ``unit``, ``share_of_time``.
+    notes : What was left out, scaled or limited because another boat flew the case.
 
     Examples
     --------
@@ -105,6 +107,8 @@ class Validation:
     in_waves: InWaves
     passed: bool
     bands: Bands | None = None
+    saturated: list[dict[str, Any]] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
 
     @property
     def version(self) -> int:
@@ -182,6 +186,8 @@ class Validation:
             "outside_tables": self.outside_tables,
             **({"curve": self.curve} if self.curve else {}),
             **({"grid": self.grid} if self.grid is not None else {}),
+            "saturated": self.saturated,
+            "notes": self.notes,
             "trim_limited": list(trim.limited) if trim else [],
             "ends_s": float(self.simulation.end[0]),
             "passed": self.passed,

@@ -13,11 +13,13 @@ from ident.metrics.measure import measured
 from ident.text import on_screen
 from ident.validation.boats import Boat, Fleet
 from ident.validation.coverage import outside_tables
+from ident.validation.other_boat import Asked, check_answers, for_boat, saturated
 from ident.validation.result import ChannelError, Validation
 from ident.validation.sweep import with_grid
 from sim.boat.database import axis_columns, version_words
 from sim.boat.vehicle import load_vehicle
 from sim.files.errors import InputError
+from sim.files.record import Record
 from sim.files.schema import FrameData
 from sim.flight.case import Case, Reference, Series, load_case, load_reference, read_series
 from sim.flight.simulate import CHANNELS, Simulation, fly
@@ -32,12 +34,12 @@ _FRAMES = {
 }
 
 
-def rmse(simulation: Simulation, channel: str, series: tuple[Array, Array, str], abscissa: str = "t") -> float:
+def rmse(simulation: Simulation, channel: str, record: Record, abscissa: str = "t") -> float:
     """Root mean square difference at the reference's own times or path lengths, in its unit."""
-    along, value, unit = series
+    value, unit, _ = record.shown
     flown = simulation[channel]
     flown = np.degrees(flown) if unit.startswith("deg") else flown
-    return float(np.sqrt(np.mean((np.interp(along, simulation[abscissa], flown) - value) ** 2)))
+    return float(np.sqrt(np.mean((np.interp(record.abscissa, simulation[abscissa], flown) - value) ** 2)))
 
 
 def check_reference(case: Case, reference: Series, where: str) -> None:
@@ -57,7 +59,7 @@ def check_reference(case: Case, reference: Series, where: str) -> None:
         if channel not in CHANNELS:
             raise InputError(f"{where}, key reference.channels", repr(channel), ", ".join(CHANNELS))
         allowed = {CHANNELS[channel], CHANNELS[channel].replace("rad", "deg")}
-        units = {reference[source][channel][2] for source in named if channel in reference[source]}
+        units = {reference[source][channel].shown.unit for source in named if channel in reference[source]}
         if not units:
             raise InputError(f"{where}, key reference.channels", repr(channel), "a channel of the reference file")
         for unit in sorted(units - allowed):
@@ -65,16 +67,13 @@ def check_reference(case: Case, reference: Series, where: str) -> None:
             raise InputError(case.reference.file or where, text, " or ".join(sorted(allowed)))
 
 
-def _published(published: dict[str, tuple[Array, Array, str]], channel: str, unit: str) -> tuple[Array, Array]:
+def _published(published: dict[str, Record], channel: str, unit: str) -> tuple[Array, Array]:
     """Abscissa and value of the published model in the reference's unit."""
-    along, value, own_unit = published[channel]
-    if own_unit != unit:
-        value = np.degrees(value) if unit.startswith("deg") else np.radians(value)
-    return along, value
+    return published[channel].abscissa, published[channel].in_unit(unit).value
 
 
 def _error(
-    simulation: Simulation, reference: Series, source: str, channel: str, published: dict[str, tuple[Array, Array, str]]
+    simulation: Simulation, reference: Series, source: str, channel: str, published: dict[str, Record]
 ) -> ChannelError:
     """Comparison of one channel with one source, as far as both go.
 
@@ -83,14 +82,14 @@ def _error(
     InputError
         When the reference begins after the run ends.
     """
-    along, value, unit = reference[source][channel]
+    record = reference[source][channel]
+    along, (value, unit, _) = record.abscissa, record.shown
     flown = along <= float(simulation[reference.abscissa][-1]) + 1e-9
     if not flown.any():
         end = f"the run ends at {simulation[reference.abscissa][-1]:.4g}"
         raise InputError(f"reference {source} {channel}", f"begins at {reference.abscissa} = {along[0]:.4g}", end)
-    found = rmse(simulation, channel, (along[flown], value[flown], unit), reference.abscissa)
-    sigma = reference.sigma.get(source, {}).get(channel)
-    scatter = None if sigma is None else float(np.sqrt(np.mean(sigma[flown] ** 2)))
+    found = rmse(simulation, channel, record.kept(flown), reference.abscissa)
+    scatter = record.kept(flown).rms_sigma
     other = _published_rmse(along, value, flown, _published(published, channel, unit)) if channel in published else None
     return ChannelError(found, unit, int(flown.sum()), other, found / other if other else None, scatter)
 
@@ -209,6 +208,9 @@ def validate(
     vehicle: str | os.PathLike[str] | None = None,
     reference: str | os.PathLike[str] | None = None,
     frame: str | None = None,
+    speed: float | None = None,
+    depth: float | None = None,
+    angle: float | None = None,
     fleet: Fleet | None = None,
 ) -> Validation:
     """Fly a case from a database version and hold it against its references.
@@ -222,6 +224,8 @@ def validate(
         value, unit, and sigma where it is known.
     frame : Frame of ``reference``: ``source`` (x aft, z up) or ``program`` (x forward, z down);
         the case's when None.
+    speed, depth, angle : Speed [m/s], depth of the sail top [m] and plane angle [deg] instead of the
+        case's; references then do not apply.
     fleet : The database version, where more than one case is flown from it.
 
     Returns
@@ -243,19 +247,20 @@ def validate(
     ['psi', 'r', 'u']
     """
     flown, where = load_case(os.fspath(case))
+    ship = load_vehicle(os.fspath(vehicle)) if vehicle else load_vehicle(flown.vehicle, beside=where)
+    flown, notes = for_boat(flown, where, ship, Asked(speed, depth, angle))
     if reference is not None:
         flown, series = _with_reference(flown, Path(reference), frame)
     else:
         series = load_reference(flown, where)
     check_reference(flown, series, where)
-    ship = load_vehicle(os.fspath(vehicle)) if vehicle else load_vehicle(flown.vehicle, beside=where)
-    flown = flown.model_copy(update={"vehicle": ship.name})
     boat = (fleet or Fleet(os.fspath(db), version)).boat(ship)
     simulation, as_started = flights(flown, boat)
     for one in (simulation, *as_started.values()):
         if len(one["t"]) < 2:
             found_at = f"the run ends at {one.end[0]:.3f} s, before a second record"
             raise InputError(f"{where}, key run", found_at, "a run of two records or more; events that happen later")
+    check_answers(simulation, flown, ship)
     found = errors(flown, series, simulation, as_started)
     found_on = measured(flown, simulation, series, as_started)
     model = boat.model(flown)
@@ -278,6 +283,8 @@ def validate(
         grid=grid.get("grid"),
         in_waves=found_on.in_waves,
         passed=bool(_complete(simulation) and met),
+        saturated=saturated(simulation, flown, ship),
+        notes=notes,
     )
 
 
@@ -322,6 +329,11 @@ def show(done: Validation, console: Console) -> None:
         console.print(table)
     _show_grid(done.grid or [], console)
     _show_outside(done, console)
+    for note in done.notes:
+        console.print(note, highlight=False)
+    for one in done.saturated:
+        share = f"{100.0 * one['share_of_time']:.0f} % of the time"
+        console.print(f"[red]{one['actuator']}: at the limit of {one['limit']:g} {one['unit']} for {share}[/]")
     limited = done.simulation.trim.limited if done.simulation.trim else ()
     if limited:
         console.print(f"[red]at the start at their limit: {', '.join(limited)}[/]")

@@ -15,6 +15,7 @@ from sim.boat.vehicle import bundled, read_toml
 from sim.files import inputs
 from sim.files.errors import InputError
 from sim.files.frames import Frame
+from sim.files.record import Record, Written
 from sim.files.schema import Data, FrameData, Name, checked
 from sim.flight.commands import Commands, Event
 
@@ -243,27 +244,16 @@ class Case(Data):
 class Series:
     """Reference series by source and channel, in the program frame.
 
-    ``self[source][channel]`` is (abscissa, value, unit): time [s] or path length [m].
-    ``sigma[source][channel]`` is the standard error of reading the value, where stated.
+    ``self[source][channel]`` is a ``Record`` over time [s] or path length [m]; its ``sigma`` is the
+    standard error of reading the value, where stated.
     """
 
-    def __init__(
-        self,
-        data: dict[str, dict[str, tuple[Array, Array, str]]],
-        abscissa: Literal["t", "s"] = "t",
-        sigma: dict[str, dict[str, Array]] | None = None,
-    ) -> None:
+    def __init__(self, data: dict[str, dict[str, Record]], abscissa: Literal["t", "s"] = "t") -> None:
         self.data = data
         self.abscissa = abscissa
-        self.sigma = sigma or {}
 
-    def __getitem__(self, source: str) -> dict[str, tuple[Array, Array, str]]:
+    def __getitem__(self, source: str) -> dict[str, Record]:
         return self.data.get(source, {})
-
-
-def in_radians(value: Array, unit: str) -> Array:
-    """Values of a reference series in the simulation's unit: degrees become radians."""
-    return np.radians(value) if unit.startswith("deg") else value
 
 
 def load_case(name: str | Path) -> tuple[Case, str]:
@@ -301,8 +291,7 @@ def _from_start(series: Series, channels: list[str]) -> Series:
     for own in series.data.values():
         for channel in channels:
             if channel in own:
-                along, value, unit = own[channel]
-                own[channel] = (along, value - value[0], unit)
+                own[channel] = own[channel].less(own[channel].shown.value[0])
     return series
 
 
@@ -336,8 +325,7 @@ def read_series(path: Path, abscissa: Literal["t", "s"], frame: Frame) -> Series
             raise InputError(f"{path}, row {blank[0] + 2}, column {column}", "nothing", f"a {column}")
     for column in (abscissa, "value", *(["sigma"] if "sigma" in table else [])):
         _numbers(table, column, path)
-    data: dict[str, dict[str, tuple[Array, Array, str]]] = {}
-    sigma: dict[str, dict[str, Array]] = {}
+    data: dict[str, dict[str, Record]] = {}
     for (source, channel), rows in table.groupby(["source", "channel"], sort=False):
         along = rows[abscissa].to_numpy(dtype=float)
         if np.any(np.diff(along) <= 0.0):
@@ -346,10 +334,10 @@ def read_series(path: Path, abscissa: Literal["t", "s"], frame: Frame) -> Series
         if len(units) > 1:
             raise InputError(f"{path}, {source} {channel}", f"units {', '.join(units)}", "one unit a series")
         value = rows["value"].to_numpy(dtype=float) * frame.sign(str(channel))
-        data.setdefault(str(source), {})[str(channel)] = (along, value, str(units[0]))
-        if "sigma" in rows:
-            sigma.setdefault(str(source), {})[str(channel)] = rows["sigma"].to_numpy(dtype=float)
-    return Series(data, abscissa, sigma)
+        sigma = rows["sigma"].to_numpy(dtype=float) if "sigma" in rows else None
+        one = Record.read(str(channel), along, Written(value, str(units[0]), sigma))
+        data.setdefault(str(source), {})[str(channel)] = one
+    return Series(data, abscissa)
 
 
 def load_reference(case: Case, where: str) -> Series:

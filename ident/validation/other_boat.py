@@ -1,0 +1,236 @@
+"""A case flown with another boat, or at another speed, depth or angle, than the one it was written for.
+
+What belongs to the case's own boat (references, published values, tolerances) does not go with it. A
+bundled case is brought to the size of the other boat by Froude's law: times with the root of the ratio of
+lengths, lengths with it; autopilot gains keep their meaning.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from sim.boat.vehicle import Vehicle, bundled, load_vehicle
+from sim.files.errors import InputError
+from sim.flight.case import Case
+from sim.flight.commands import Commands, Event
+from sim.flight.simulate import Simulation, mixer_of
+
+# Powers of the ratio of lengths of what an event watches: a rate of change per second of it.
+_LENGTHS = {"D0": 1.0, "z": 1.0, "x": 1.0, "y": 1.0, "point_depth": 1.0, "u": 0.5, "v": 0.5, "w": 0.5, "U": 0.5}
+_LENGTHS |= {"p": -0.5, "q": -0.5, "r": -0.5}
+# Gains: proportional, integral and differential, on a distance, an angle, a yaw rate, a speed.
+_GAINS = {"z": -1.0, "y": -1.0, "theta": 0.0, "psi": 0.0, "r": 0.5, "u": -1.0}
+_TIMES = {"P": 0.0, "I": -0.5, "D": 0.5}
+_STOPS = math.radians(0.01)
+
+
+@dataclass(frozen=True)
+class Asked:
+    """Speed [m/s], depth of the sail top [m] and plane or rudder angle [deg] instead of the case's."""
+
+    speed_mps: float | None = None
+    depth_m: float | None = None
+    angle_deg: float | None = None
+
+
+def _event(event: Event, ratio: float) -> Event:
+    """An event at the size of the other boat; levels of depth are where they are."""
+    root = math.sqrt(ratio)
+    power = _LENGTHS.get(event.channel or "", 0.0)
+    moved: dict[str, Any] = {}
+    for key, factor in (("after_s", root), ("for_s", root), ("steady", ratio**power / root)):
+        if getattr(event, key) is not None:
+            moved[key] = getattr(event, key) * factor
+    if event.change is not None:
+        moved["change"] = event.change * ratio**power
+    if event.point_m is not None:
+        moved["point_m"] = [x * ratio for x in event.point_m]
+    return event.model_copy(update=moved)
+
+
+def _commands(command: Commands, ratio: float) -> Commands:
+    updates: dict[str, Any] = {}
+    for axis in ("dV", "dH", "n"):
+        one = getattr(command, axis)
+        moved: dict[str, Any] = {}
+        for name in type(one).model_fields:
+            kind, _, of = name.partition("_")
+            if kind in _TIMES and of in _GAINS:
+                moved[name] = getattr(one, name) * ratio ** (_GAINS[of] + _TIMES[kind])
+        steps = []
+        for step in one.step:
+            change: dict[str, Any] = {"until": [_event(e, ratio) for e in step.until]}
+            for key, power in (("distance_m", 1.0), ("yaw_rate_degps", -0.5), ("value_rps", -0.5)):
+                if getattr(step, key, None):
+                    change[key] = getattr(step, key) * ratio**power
+            steps.append(step.model_copy(update=change))
+        updates[axis] = one.model_copy(update=moved | {"step": steps})
+    return command.model_copy(update=updates)
+
+
+def _scaled(case: Case, ratio: float) -> Case:
+    """Times, speed, gains and events by Froude's law; the depth stays, so that deep is deep."""
+    root = math.sqrt(ratio)
+    run = case.run.model_copy(
+        update={
+            "duration_s": case.run.duration_s * root,
+            "record_s": case.run.record_s * root,
+            "step_s": min(case.run.step_s, case.run.step_s * root),
+            "stop": [_event(e, ratio) for e in case.run.stop],
+        }
+    )
+    initial = case.initial.model_copy(update={"speed_mps": case.initial.speed_mps * root})
+    return case.model_copy(update={"run": run, "initial": initial, "command": _commands(case.command, ratio)})
+
+
+def largest_command(case: Case, vehicle: Vehicle, axis: str) -> float | None:
+    """Largest dV or dH [deg] that some plane can follow; None where no plane has a share in it."""
+    shares = np.abs(mixer_of(vehicle, case.sail_planes)[:, 0 if axis == "dV" else 1])
+    reach = [p.limit_deg / s for p, s in zip(vehicle.planes, shares, strict=True) if s > 0.0]
+    return max(reach) if reach else None
+
+
+def _turned(value: float | None, to: float) -> float | None:
+    return value if not value else math.copysign(to, value)
+
+
+def _angles(case: Case, axis: str, angle: float | None, most: float | None) -> tuple[Case, list[str]]:
+    """Commands of one axis set to an angle, or brought within what the planes can do."""
+    one = getattr(case.command, axis)
+    moved: dict[str, Any] = {}
+    notes: list[str] = []
+
+    def wanted(value: float, name: str) -> float:
+        to = angle if angle is not None else abs(value)
+        if most is not None and to > most + 1e-9:
+            notes.append(f"{axis} {name}: {to:g} deg asked, the planes stop at {most:g} deg, which is flown")
+            to = most
+        return math.copysign(to, value)
+
+    if one.law == "zigzag":
+        moved["first_deg"] = wanted(one.first_deg, "of the zigzag")
+    elif one.law == "fixed" and one.value_deg:
+        moved["value_deg"] = wanted(one.value_deg, "command")
+    elif one.law == "programme":
+        # A programme keeps its proportions: its largest angle is the one asked for.
+        values = [abs(s.value_deg) for s in one.step if s.value_deg]
+        if values:
+            factor = wanted(max(values), "of the programme") / max(values)
+            moved["step"] = [
+                s.model_copy(update={"value_deg": s.value_deg * factor}) if s.value_deg else s for s in one.step
+            ]
+    if not moved:
+        return case, []
+    command = case.command.model_copy(update={axis: one.model_copy(update=moved)})
+    return case.model_copy(update={"command": command}), notes
+
+
+def _title(case: Case, vehicle: Vehicle) -> str:
+    name = case.name.replace("-", " ").capitalize()
+    angles = []
+    for axis in ("dV", "dH"):
+        one = getattr(case.command, axis)
+        values = [one.first_deg] if one.law == "zigzag" else [one.value_deg] if one.law == "fixed" else []
+        angles += [f"{axis} {v:g} deg" for v in values if v]
+    speed = [f"{case.initial.speed_mps:.3g} m/s"] if case.initial.speed_mps else ["at rest"]
+    return f"{name} of {vehicle.name}: {', '.join([*angles, *speed, f'D0 {case.initial.depth_m:g} m'])}"
+
+
+def for_boat(case: Case, where: str, vehicle: Vehicle, asked: Asked) -> tuple[Case, list[str]]:
+    """A case as another boat flies it, or at another speed, depth or angle.
+
+    Parameters
+    ----------
+    case, where : From ``load_case``.
+    vehicle : What flies it.
+    asked : Instead of the case's.
+
+    Returns
+    -------
+    case : With the boat's name and, where anything changed, a title that says what is flown.
+    notes : What was left out, scaled or limited.
+
+    Raises
+    ------
+    InputError
+        For an angle where the case commands none.
+    """
+    own, changed = vehicle.name == case.vehicle or _home(case, where) == vehicle.name, asked != Asked()
+    if own and not changed:
+        return case.model_copy(update={"vehicle": vehicle.name}), []
+    notes: list[str] = []
+    home = case.vehicle
+    if case.reference or case.published or case.tolerance:
+        what = "of " + home if not own else "at the case's own speed, depth and angle"
+        notes.append(f"references, published values and tolerances {what} left out")
+    moved = case.model_copy(update={"vehicle": vehicle.name, "reference": None, "published": [], "tolerance": []})
+    if not own and where in bundled("cases"):
+        ratio = vehicle.particulars.length.value / load_vehicle(home).particulars.length.value
+        moved = _scaled(moved, ratio)
+        if case.initial.speed_mps and asked.speed_mps is None:
+            text = f"speed {case.initial.speed_mps:.4g} m/s of {home} brought to {moved.initial.speed_mps:.3g} m/s"
+            notes.append(f"{text} by Froude's law, times and gains alike; --speed states another")
+    update = {k: v for k, v in (("speed_mps", asked.speed_mps), ("depth_m", asked.depth_m)) if v is not None}
+    moved = moved.model_copy(update={"initial": moved.initial.model_copy(update=update)})
+    for axis in ("dV", "dH"):
+        moved, said = _angles(moved, axis, asked.angle_deg, largest_command(case, vehicle, axis))
+        notes += said
+    if asked.angle_deg is not None and not _commanded(moved):
+        raise InputError(f"case {case.name}, --angle", f"{asked.angle_deg:g} deg", "a case that commands an angle")
+    return moved.model_copy(update={"title": _title(moved, vehicle)}), notes
+
+
+def _home(case: Case, where: str) -> str:
+    """Name of the vehicle that the case names, which may be a path."""
+    if not case.vehicle.endswith(".toml"):
+        return case.vehicle
+    return load_vehicle(case.vehicle, beside=where).name
+
+
+def _commanded(case: Case) -> list[str]:
+    """Axes to which the case gives an angle, by itself or by a programme."""
+    found = []
+    for axis in ("dV", "dH"):
+        one = getattr(case.command, axis)
+        fixed = one.law == "fixed" and bool(one.value_deg)
+        if fixed or one.law == "zigzag" or any(s.value_deg or s.yaw_rate_degps for s in one.step):
+            found.append(axis)
+    return found
+
+
+def saturated(simulation: Simulation, case: Case, vehicle: Vehicle) -> list[dict[str, Any]]:
+    """Actuators that lay at their limit for part of a flight: which, at what, for what share of the time."""
+    found = []
+    for plane in vehicle.planes:
+        share = float(np.mean(np.abs(simulation[plane.name]) >= math.radians(plane.limit_deg) - 1e-9))
+        if share > 0.0:
+            found.append({"actuator": plane.name, "limit": plane.limit_deg, "unit": "deg", "share_of_time": share})
+    for limit in case.command.n.limits_rps or vehicle.propeller.limits.value:
+        share = float(np.mean(np.abs(simulation["n"] - limit) <= 1e-9))
+        if share > 0.0 and case.command.n.law != "fixed":
+            found.append({"actuator": "n", "limit": float(limit), "unit": "1/s", "share_of_time": share})
+    return found
+
+
+def check_answers(simulation: Simulation, case: Case, vehicle: Vehicle) -> None:
+    """Refuse a flight whose commands change nothing.
+
+    Raises
+    ------
+    InputError
+        When planes are commanded and neither turn nor pitch of the boat leaves its start.
+    """
+    for axis in _commanded(case):
+        angle, track = ("psi", "y") if axis == "dH" else ("theta", "z")
+        if largest_command(case, vehicle, axis) is None:
+            found = f"{axis} is commanded, and no plane of {vehicle.name} has a share in it"
+        elif np.ptp(simulation[angle]) < _STOPS and np.ptp(simulation[track]) < 1e-6 * simulation.length:
+            found = f"a flat line: {axis} is commanded, and {angle} of {vehicle.name} does not change"
+        else:
+            continue
+        allowed = "a version with the loads of its planes or rudder: terms in the term set and rows in the database"
+        raise InputError(f"case {case.name}", found, allowed)
