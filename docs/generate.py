@@ -25,8 +25,8 @@ from ident.validation.figures import case_figure
 from ident.validation.scoreboard import entries, run_all
 from sim.boat import catalogue
 from sim.boat.coefficients import Coefficients
+from sim.boat.mass import Environment
 from sim.flight.case import load_case
-from sim.kernel.assemble import Environment
 
 CASE = "hzz20"
 

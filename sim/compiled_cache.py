@@ -42,7 +42,8 @@ def compiled_sources(folder: Path) -> list[Path]:
         ".".join(path.relative_to(folder).with_suffix("").parts): path.read_text(encoding="utf-8")
         for path in folder.rglob("*.py")
     }
-    todo = [name for name, source in text.items() if "cache=True" in source and not name.startswith("bench.")]
+    marks = ("cache=True", "from sim.compiled import")
+    todo = [n for n, source in text.items() if any(m in source for m in marks) and not n.startswith("bench.")]
     found: set[str] = set()
     while todo:
         name = todo.pop()

@@ -20,7 +20,8 @@ from ident.identification.identify import identify
 from sim.boat.catalogue import OUTPUTS
 from sim.boat.coefficients import Coefficients
 from sim.boat.forces import axis_values, boat_features, multiplier, plane_features
-from sim.kernel.assemble import Environment, assemble
+from sim.boat.mass import Environment
+from sim.kernel.assemble import assemble
 
 ROOT = Path(__file__).parents[1]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sim.kernel.assemble import cross_matrix
+from sim.boat.mass import cross_matrix
 from sim.waves.mean_loads import DipoleBody, plane_waves
 
 RHO, G = 1025.0, 9.81

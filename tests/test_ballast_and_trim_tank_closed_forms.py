@@ -6,16 +6,18 @@ import numpy as np
 import pytest
 
 from sim.boat.coefficients import Coefficients
+from sim.boat.mass import Environment
 from sim.files.errors import InputError
-from sim.flight import maneuver
+from sim.flight.autopilot import command_boat
 from sim.flight.case import load_case
 from sim.flight.commands import TankCommand
-from sim.flight.events import progress
+from sim.flight.orders import COMMAND, N_COMMANDS, flat, progress
 from sim.flight.simulate import initial_state, mixer_of, model_of, plane_limits, settings_of, simulate
 from sim.flight.trim import NoEquilibrium, self_propulsion
 from sim.kernel import plain
 from sim.kernel import rhs as kernel
-from sim.kernel.assemble import Environment, assemble, with_tanks
+from sim.kernel.assemble import assemble, with_tanks
+from sim.kernel.layout import workspace
 
 STATE = np.array([5.0, 0.3, -0.2, 0.02, 0.01, -0.015, 0.0, 0.0, 40.0, 0.15, 0.05, 0.3])
 CONTROLS = np.array([0.1, 0.2, -0.1, 0.05, 0.03, 1.2])
@@ -29,7 +31,7 @@ def wet(model, campaign):
 
 def _derivative(model, state, controls):
     out = np.zeros(12)
-    kernel.rhs(model, state, controls, kernel.workspace(5), out)
+    kernel.rhs(model, state, controls, workspace(model), out)
     return out
 
 
@@ -37,7 +39,7 @@ def test_compiled_tanks_agree_with_the_plain_reading(wet):
     """Any tank place, ballast and shift, against vectors and a solved mass matrix."""
     rng = np.random.default_rng(3)
     for _ in range(50):
-        other = wet._replace(tank=tuple(rng.normal(size=3) * [20.0, 3.0, 3.0]))
+        other = wet.replaced(tank=rng.normal(size=3) * [20.0, 3.0, 3.0])
         state = STATE + rng.normal(size=12) * 0.05
         controls = np.append(CONTROLS, [rng.normal() * 5e4, rng.normal() * 0.1])
         expected = plain.rhs(other, state, controls)
@@ -172,10 +174,12 @@ def test_too_deep_pumps_out_and_bow_up_moves_weight_forward(coefficients):
     model = model_of(case, coefficients)
     state, controls, trim = initial_state(case, coefficients.vehicle, model)
     settings = settings_of(case, coefficients.vehicle, state, controls, trim)
-    moved, command = state.copy(), np.zeros(5)
+    moved = state.copy()
     moved[8] += 2.0
     moved[10] += np.radians(3.0)
-    maneuver.autopilot(settings, moved, np.zeros(12), progress(settings.programme, state), np.zeros(10), 1e-12, command)
+    (f, j), (g, q) = progress(settings, state), flat(settings)
+    command_boat(g, q, f, j, moved, np.zeros(12), 1e-12)
+    command = f[COMMAND : COMMAND + N_COMMANDS]
     assert command[3] == pytest.approx(controls[6] - 2.0 * 1000.0)
     assert command[4] == pytest.approx(controls[7] + 3.0 * 3.5e-4)
 

@@ -10,9 +10,11 @@ import pytest
 from sim.boat.catalogue import OUTPUTS
 from sim.boat.coefficients import Coefficients
 from sim.boat.forces import plane_features
+from sim.boat.mass import rigid_body_matrix
 from sim.flight.simulate import mixer_of
 from sim.kernel import rhs as kernel
-from sim.kernel.assemble import assemble, rigid_body_matrix
+from sim.kernel.assemble import assemble
+from sim.kernel.layout import workspace
 
 U0 = 5.14444
 
@@ -27,7 +29,7 @@ def _static_load(model, vehicle, **state):
     y, dy = np.zeros(12), np.zeros(12)
     for name, value in state.items():
         y[9 + ("phi", "theta", "psi").index(name)] = value
-    kernel.rhs(model, y, np.zeros(6), kernel.workspace(5), dy)
+    kernel.rhs(model, y, np.zeros(6), workspace(model), dy)
     return rigid_body_matrix(vehicle)[0] @ dy[:6]
 
 
@@ -102,11 +104,11 @@ def test_incidence_of_rotation_is_lever_times_rate_over_speed(campaign):
 
 def _plane_loads(model, controls, velocity=(U0, 0.0, 0.0), rates=(0.0, 0.0, 0.0)):
     """Hydrodynamic loads that deflecting the planes adds."""
-    work, y = kernel.workspace(5), np.zeros(12)
+    work, y = workspace(model), np.zeros(12)
     y[:3], y[3:6], y[8] = velocity, rates, 25.0 - model.sail_top
     found = []
     for c in (np.append(controls, 1.18), np.append(np.zeros(5), 1.18)):
-        kernel.fill_features(model, y, c, work.features)
+        kernel.features(model, y, c, work)
         kernel.loads(model, work)
         found.append(work.loads[:6].copy())
     return dict(zip(OUTPUTS, found[0] - found[1], strict=True))
@@ -155,13 +157,13 @@ def test_plane_incidence_damps_roll_pitch_and_yaw(campaign, rows, environment):
     """Only the planes' coefficients: each rotation meets a moment against it."""
     names = [p.name for p in campaign.vehicle.planes]
     model = assemble(Coefficients(campaign.vehicle, rows[rows["part"].isin(names)]), environment)
-    work = kernel.workspace(5)
+    work = workspace(model)
     for k, moment in enumerate("KMN"):
         found = []
         for rate in (0.01, -0.01):
             y = np.zeros(12)
             y[0], y[3 + k], y[8] = U0, rate, 25.0 - model.sail_top
-            kernel.fill_features(model, y, np.zeros(6), work.features)
+            kernel.features(model, y, np.zeros(6), work)
             kernel.loads(model, work)
             found.append(work.loads[OUTPUTS.index(moment)])
         assert found[0] - found[1] < 0.0, moment

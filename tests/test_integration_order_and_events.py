@@ -14,6 +14,7 @@ from sim.flight.case import load_case
 from sim.flight.simulate import initial_state, plane_limits, settings_of, simulate
 from sim.kernel import rhs as kernel
 from sim.kernel.assemble import assemble
+from sim.kernel.layout import workspace
 
 # Appended SUBOFF derivatives (model.md section 10), and round values where it names none.
 SMOOTH = {
@@ -39,14 +40,14 @@ START = np.array([5.0, 0.3, -0.2, 0.02, 0.01, -0.015, 0.0, 0.0, 40.0, 0.15, 0.05
 
 
 def _steps(model, state, controls, duration, step):
-    work, stages, y = kernel.workspace(5), np.zeros((6, 12)), state.copy()
+    work, y = workspace(model), state.copy()
     for _ in range(round(duration / step)):
-        kernel.rk4(model, y, controls, np.zeros(6), step, work, stages, y)
+        kernel.rk4(model, y, controls, np.zeros(6), step, work, y)
     return y
 
 
 def _reference(model, state, controls, duration, rtol=1e-10):
-    work = kernel.workspace(5)
+    work = workspace(model)
 
     def f(_, y):
         out = np.zeros(12)
@@ -123,7 +124,7 @@ def test_heading_at_each_execute_is_the_check_angle(coefficients, environment):
     case, found = _zigzag(coefficients, 0.05)
     vehicle, model = coefficients.vehicle, assemble(coefficients, environment)
     settings = settings_of(case, vehicle, found.record[0, 1:13], found.record[0, 13:19], found.trim)
-    work, stages, y = kernel.workspace(5), np.zeros((6, 12)), np.zeros(12)
+    work, y = workspace(model), np.zeros(12)
     limit, rate_limit = plane_limits(vehicle)
     for time, command in found.executes[1:]:
         i = int(time // 0.05)
@@ -131,7 +132,7 @@ def test_heading_at_each_execute_is_the_check_angle(coefficients, environment):
         planes, wanted = row[13:18], settings.mixer @ row[-2:]
         rate = np.clip((np.clip(wanted, -limit, limit) - planes) / 0.05, -rate_limit, rate_limit)
         controls = np.append(planes, row[18])
-        kernel.rk4(model, row[1:13], controls, np.append(rate, 0.0), time - row[0], work, stages, y)
+        kernel.rk4(model, row[1:13], controls, np.append(rate, 0.0), time - row[0], work, y)
         # Reversing to +20 deg happens at -5 deg of heading, and the other way round.
         assert y[11] == pytest.approx(-np.sign(command) * np.radians(5.0), abs=5e-8)
     assert len(found.executes) >= 3

@@ -6,11 +6,13 @@ import numpy as np
 import pytest
 
 from sim.boat.coefficients import Coefficients
+from sim.boat.mass import rigid_body_matrix
 from sim.boat.parts import mirror_of, vehicle_terms
 from sim.flight.case import load_case
 from sim.flight.simulate import simulate
 from sim.kernel import rhs as kernel
-from sim.kernel.assemble import assemble, rigid_body_matrix
+from sim.kernel.assemble import assemble
+from sim.kernel.layout import workspace
 
 PLANES = 5
 # State order u v w p q r x y z phi theta psi: what changes sign in the mirror.
@@ -44,11 +46,11 @@ def _rotation(state):
 
 def _fly_free(model, state, duration, step):
     """RK4 with all controls at zero; every state."""
-    work, stages = kernel.workspace(PLANES), np.zeros((6, 12))
+    work = workspace(model)
     controls = np.zeros(PLANES + 1)
     y, states = state.copy(), [state.copy()]
     for _ in range(round(duration / step)):
-        kernel.rk4(model, y, controls, controls, step, work, stages, y)
+        kernel.rk4(model, y, controls, controls, step, work, y)
         states.append(y.copy())
     return np.array(states)
 
@@ -56,7 +58,7 @@ def _fly_free(model, state, duration, step):
 def _derivative(model, state, controls=None):
     out = np.zeros(12)
     controls = np.zeros(PLANES + 1) if controls is None else controls
-    kernel.rhs(model, state, controls, kernel.workspace(PLANES), out)
+    kernel.rhs(model, state, controls, workspace(model), out)
     return out
 
 

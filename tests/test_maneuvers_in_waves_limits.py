@@ -95,7 +95,7 @@ def _gauge(around, state, rate, time):
 
 def test_a_depth_gauge_reads_depth_and_the_head_of_the_wave(coefficients, environment, model):
     wave = regular(3.0, 120.0, 2.0, environment.density, environment.gravity)
-    around = surroundings(water_around(coefficients, environment, wave, second_order=False), model)
+    around = surroundings(water_around(coefficients, environment, wave, second_order=False), model.added_mass)
     state, rate = np.zeros(12), np.zeros(12)
     state[0], state[6:9], rate[6] = 5.0, (30.0, -20.0, 17.0), 5.0
 

@@ -11,10 +11,12 @@ import pytest
 from scipy.linalg import eigh
 
 from sim.boat.coefficients import Coefficients
+from sim.boat.mass import added_mass_matrix, rigid_body_matrix
 from sim.flight.simulate import mixer_of, plane_limits
 from sim.flight.trim import NoEquilibrium, self_propulsion
 from sim.kernel import rhs as kernel
-from sim.kernel.assemble import added_mass_matrix, assemble, rigid_body_matrix
+from sim.kernel.assemble import assemble
+from sim.kernel.layout import workspace
 
 PUBLISHED = Path(__file__).parent / "data" / "published" / "bb2"
 # Source frame (x aft, z up) to program frame: a turn of 180 deg about y.
@@ -132,12 +134,12 @@ def test_small_roll_decay_without_damping_has_that_period(campaign, rows, enviro
     """Added mass only, 0.2 deg from rest: crossings of zero heel against the eigenproblem."""
     only = rows[rows["coefficient"].str.endswith("dot")]
     model = assemble(Coefficients(campaign.vehicle, only), environment)
-    work, stages, controls = kernel.workspace(5), np.zeros((6, 12)), np.zeros(6)
+    work, controls = workspace(model), np.zeros(6)
     y, step, times, before = np.zeros(12), 0.02, [], None
     y[8], y[9] = 36.0, np.radians(0.2)
     for i in range(round(70.0 / step)):
         before = y[9]
-        kernel.rk4(model, y, controls, controls, step, work, stages, y)
+        kernel.rk4(model, y, controls, controls, step, work, y)
         if before * y[9] < 0.0:
             times.append(step * (i + before / (before - y[9])))
     period = 2.0 * np.mean(np.diff(times))
@@ -175,7 +177,7 @@ def test_self_propulsion_is_an_equilibrium_on_a_straight_level_path(model, campa
     vehicle = campaign.vehicle
     trim = self_propulsion(model, mixer_of(vehicle), speed, depth, plane_limits(vehicle)[0])
     dy = np.zeros(12)
-    kernel.rhs(model, trim.state, trim.controls, kernel.workspace(5), dy)
+    kernel.rhs(model, trim.state, trim.controls, workspace(model), dy)
     assert np.abs(dy[:6]).max() < 1e-10
     assert trim.residual < 1e-10
     # Course along earth x at the asked speed: no sway, no depth change, no turning.
@@ -189,14 +191,14 @@ def test_no_equilibrium_is_said_when_the_planes_may_not_move(model, campaign):
 
 def test_rate_and_incidence_derivatives_have_the_published_signs(model):
     """Program frame: Y_v, N_v, Z_w < 0; M_w > 0; N_r, M_q, K_p < 0; Y_r > 0, Z_q < 0."""
-    work = kernel.workspace(5)
+    work = workspace(model)
 
     def loads(**change):
         y, c = np.zeros(12), np.zeros(6)
         y[0], y[8], c[5] = 5.14444, 25.0 - model.sail_top, 1.18
         for name, value in change.items():
             y["uvwpqr".index(name)] = value
-        kernel.fill_features(model, y, c, work.features)
+        kernel.features(model, y, c, work)
         kernel.loads(model, work)
         return work.loads[:6].copy()
 

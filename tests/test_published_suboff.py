@@ -22,11 +22,11 @@ from ident.identification.identify import identify
 from ident.report.page import write_report
 from sim.boat.coefficients import Coefficients
 from sim.boat.database import own_version, read_rows
+from sim.boat.mass import Environment
 from sim.boat.vehicle import load_vehicle
 from sim.files.errors import InputError
 from sim.flight.case import load_case
 from sim.flight.simulate import simulate
-from sim.kernel.assemble import Environment
 
 ROOT = Path(__file__).parents[1]
 SUBOFF = ROOT / "raw_captive_data" / "suboff"

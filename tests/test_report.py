@@ -19,10 +19,10 @@ from ident.report.figures import _group, quality_colours
 from ident.report.page import write_report
 from sim.boat.coefficients import Coefficients
 from sim.boat.database import column_order, read_rows, versions
+from sim.boat.mass import Environment
 from sim.boat.parts import vehicle_terms
 from sim.boat.vehicle import load_vehicle
 from sim.files.errors import InputError
-from sim.kernel.assemble import Environment
 
 BB2 = Path(__file__).parents[1] / "raw_captive_data" / "bb2"
 SPEED, DEPTH = 5.14444, 25.0

@@ -15,10 +15,12 @@ from sim.boat.catalogue import ACCELERATIONS, OUTPUTS, CatalogueError
 from sim.boat.coefficients import Coefficients
 from sim.boat.database import axis_columns
 from sim.boat.forces import boat_features, multiplier, plane_features
+from sim.boat.mass import Environment, added_mass_matrix
 from sim.boat.parts import mirror_of, parts_of, vehicle_terms
 from sim.boat.vehicle import load_vehicle
 from sim.kernel import rhs as kernel
-from sim.kernel.assemble import Environment, added_mass_matrix, assemble
+from sim.kernel.assemble import assemble
+from sim.kernel.layout import workspace
 
 SETS = catalogue.SETS
 ALL = [(s, t) for s in SETS for t in catalogue.terms(s)]
@@ -173,8 +175,8 @@ def test_a_coefficient_alone_forward_through_the_model_and_back_is_itself(term_s
         assert found == pytest.approx(value, rel=1e-15)
         return
     model = assemble(coefficients, environment)
-    work, controls = kernel.workspace(len(vehicle.planes)), rng.normal(size=len(vehicle.planes) + 1)
-    kernel.fill_features(model, state, controls, work.features)
+    work, controls = workspace(model), rng.normal(size=len(vehicle.planes) + 1)
+    kernel.features(model, state, controls, work)
     kernel.loads(model, work)
     features = boat_features(state[:3], state[3:6], 0.0, controls[-1], 0.0)
     for plane, angle in zip(vehicle.planes, controls, strict=False):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from sim.kernel.assemble import Environment, added_mass_matrix
+from sim.boat.mass import Environment, added_mass_matrix
 from sim.waves import loads as wave_loads
 from sim.waves import passage as wave_passage
 from sim.waves.in_waves import probes, section_masses, volume_points, water_around

@@ -19,9 +19,11 @@ from numpy.typing import NDArray
 
 from sim.boat.catalogue import OUTPUTS
 from sim.boat.coefficients import Coefficients
+from sim.boat.mass import Environment
 from sim.boat.vehicle import Vehicle
 from sim.kernel import rhs as kernel
-from sim.kernel.assemble import Environment, assemble
+from sim.kernel.assemble import assemble
+from sim.kernel.layout import Model, workspace
 
 Array = NDArray[np.float64]
 
@@ -89,7 +91,7 @@ class _Parts(Coefficients):
         self._all = {(c.term.name, c.part): c for c in whole if c.part in parts}
 
 
-def loads(model: kernel.Model, motion: Array, depth: float, controls: Array) -> Array:
+def loads(model: Model, motion: Array, depth: float, controls: Array) -> Array:
     """Hydrodynamic loads of the assembled boat in one state.
 
     Parameters
@@ -103,11 +105,11 @@ def loads(model: kernel.Model, motion: Array, depth: float, controls: Array) -> 
     -------
     X Y Z K M N [N, N m], program frame.
     """
-    work = kernel.workspace(controls.size - 1)
+    work = workspace(model)
     state = np.zeros(12)
     state[:6] = motion
     state[8] = depth - model.sail_top
-    kernel.fill_features(model, state, controls, work.features)
+    kernel.features(model, state, controls, work)
     kernel.loads(model, work)
     return work.loads[: len(OUTPUTS)].copy()
 
@@ -117,7 +119,7 @@ def steps(vehicle: Vehicle) -> tuple[float, float]:
     return _TABLE_STEPS if vehicle.term_set == "reduced" else _CONSTANT_STEPS
 
 
-def slope(model: kernel.Model, vehicle: Vehicle, name: str, speed: float, depth: float, revolutions: float) -> Array:
+def slope(model: Model, vehicle: Vehicle, name: str, speed: float, depth: float, revolutions: float) -> Array:
     """Central difference of the loads by one motion about straight ahead motion.
 
     Steps as in ``derivatives``; planes at zero.

@@ -17,13 +17,15 @@ from ident.text import on_screen
 from sim.boat.catalogue import OUTPUTS, STATES
 from sim.boat.coefficients import Coefficients
 from sim.boat.database import read_rows
+from sim.boat.mass import Environment, added_mass_matrix
 from sim.boat.vehicle import Vehicle, load_vehicle
 from sim.files.errors import InputError
 from sim.flight.case import load_case
 from sim.flight.simulate import environment_of, mixer_of, plane_limits
 from sim.flight.trim import NoEquilibrium, self_propulsion
 from sim.kernel import rhs as kernel
-from sim.kernel.assemble import Environment, added_mass_matrix, assemble
+from sim.kernel.assemble import assemble
+from sim.kernel.layout import Model, workspace
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -203,7 +205,7 @@ def critical_speed(stiffness: float, z_w: float, m_w: float, z_d: float, m_d: fl
     return math.sqrt(stiffness / turning) if stiffness * turning > 0.0 else None
 
 
-def _plane_slope(model: kernel.Model, vehicle: Vehicle, names: list[str], speed: float, depth: float) -> Array:
+def _plane_slope(model: Model, vehicle: Vehicle, names: list[str], speed: float, depth: float) -> Array:
     """Loads by the vertical command on some planes [N, N m per rad]."""
     shares = np.array([p.mixer.dV if p.name in names else 0.0 for p in vehicle.planes])
     motion = np.array([speed, 0.0, 0.0, 0.0, 0.0, 0.0])
@@ -212,10 +214,10 @@ def _plane_slope(model: kernel.Model, vehicle: Vehicle, names: list[str], speed:
 
 
 def _linear(
-    model: kernel.Model, vehicle: Vehicle, state: Array, controls: Array, kept: tuple[int, ...], step: float
+    model: Model, vehicle: Vehicle, state: Array, controls: Array, kept: tuple[int, ...], step: float
 ) -> Linear:
     """Central differences of the right-hand side; ``step`` in a state, a degree in the command."""
-    work = kernel.workspace(controls.size - 1)
+    work = workspace(model)
 
     def change(to_state: Array, to_controls: Array) -> Array:
         side = []
@@ -241,7 +243,7 @@ def _eigenvalues(linear: Linear) -> list[tuple[float, float]]:
 
 
 def _linear_models(
-    coefficients: Coefficients, environment: Environment, model: kernel.Model, speed: float, depth: float
+    coefficients: Coefficients, environment: Environment, model: Model, speed: float, depth: float
 ) -> tuple[dict[str, Linear], str]:
     """Linear models, vertical and horizontal, as far as there are any; the state they are about."""
     vehicle = coefficients.vehicle

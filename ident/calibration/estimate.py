@@ -27,13 +27,14 @@ from scipy.optimize import least_squares, minimize_scalar
 from ident.calibration.file import CalibrationFile, Parameter, Training, apply
 from ident.validation.validate import check_reference
 from sim.boat.coefficients import Coefficients
+from sim.boat.mass import Environment
 from sim.boat.vehicle import Vehicle, load_vehicle
 from sim.files.errors import InputError
 from sim.files.record import Record
 from sim.flight.case import Case, Series, load_case, load_reference
 from sim.flight.simulate import Simulation, environment_of, equipped, fly, water_of
 from sim.flight.trim import NoEquilibrium
-from sim.kernel.assemble import Assembly, Environment
+from sim.kernel.assemble import Assembly
 from sim.waves.in_waves import Water
 
 Array = NDArray[np.float64]

@@ -9,12 +9,13 @@ from typing import TYPE_CHECKING
 
 from sim.boat.coefficients import Coefficients
 from sim.boat.database import Version, last_own, read_rows, versions
+from sim.boat.mass import Environment
 from sim.boat.vehicle import Vehicle
 from sim.files.errors import InputError
 from sim.flight.case import Case
 from sim.flight.simulate import environment_of, equipped, water_of
-from sim.kernel.assemble import Environment, assemble
-from sim.kernel.rhs import Model
+from sim.kernel.assemble import assemble
+from sim.kernel.layout import Model
 from sim.waves.in_waves import Water
 
 if TYPE_CHECKING:

@@ -11,27 +11,28 @@ from sim.boat.catalogue import feature_index
 from sim.boat.coefficients import Coefficient, Coefficients
 from sim.flight.simulate import Simulation
 from sim.kernel import rhs as kernel
+from sim.kernel.layout import Model, workspace
 
 Array = NDArray[np.float64]
 # Samples of a record that are looked at: enough for a share of time.
 _COVERAGE_SAMPLES = 200
 
 
-def _features(simulation: Simulation, model: kernel.Model) -> Array:
+def _features(simulation: Simulation, model: Model) -> Array:
     """(samples, features) of the kernel at evenly spread samples of a record."""
     chosen = np.unique(np.linspace(0, len(simulation.record) - 1, _COVERAGE_SAMPLES).astype(int))
     # Columns: t, states, controls, the two commands.
     record = np.ascontiguousarray(simulation.record[chosen])
-    work = kernel.workspace(len(model.planes))
+    work = workspace(model)
     found = np.empty((len(chosen), work.features.size))
     for row, sample in zip(found, record, strict=True):
-        kernel.fill_features(model, sample[1:13], sample[13:-2], work.features)
+        kernel.features(model, sample[1:13], sample[13:-2], work)
         row[:] = work.features
     return found
 
 
 def outside_tables(
-    simulation: Simulation, coefficients: Coefficients, model: kernel.Model
+    simulation: Simulation, coefficients: Coefficients, model: Model
 ) -> tuple[list[dict[str, Any]], dict[str, list[str]]]:
     """Share of time each term was used beyond its data, and its one-valued axes.
 

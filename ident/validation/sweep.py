@@ -10,7 +10,7 @@ from sim.boat.vehicle import Vehicle
 from sim.flight.case import Case
 from sim.flight.simulate import initial_state
 from sim.flight.trim import NoEquilibrium
-from sim.kernel.rhs import Model
+from sim.kernel.layout import Model
 
 
 def _grid(case: Case, vehicle: Vehicle, model: Model) -> list[dict[str, Any]]:

@@ -15,27 +15,27 @@ from numba import njit
 
 from sim.boat.coefficients import Coefficients
 from sim.boat.database import read_rows
+from sim.boat.mass import Environment
 from sim.boat.vehicle import load_vehicle
 from sim.files.errors import InputError
 from sim.flight.case import load_case
 from sim.flight.simulate import simulate
 from sim.kernel import plain
 from sim.kernel import rhs as kernel
-from sim.kernel.assemble import Environment, assemble
+from sim.kernel.assemble import assemble
+from sim.kernel.layout import workspace
 
 
 @njit(cache=True)
-def _many_rhs(m, states, controls, work, dy, repeats):
-    for _ in range(repeats):
-        for i in range(states.shape[0]):
-            kernel.rhs(m, states[i], controls[i], work, dy)
+def _many_rhs(m, w, states, controls, s, k, dy):
+    for i in range(states.shape[0]):
+        kernel.fill_rate(m, w, states[i], controls[i], (), s, k, dy)
 
 
 @njit(cache=True)
-def _many_steps(m, states, controls, rate, work, stages, out, repeats):
-    for _ in range(repeats):
-        for i in range(states.shape[0]):
-            kernel.rk4(m, states[i], controls[i], rate, 0.05, work, stages, out)
+def _many_steps(m, w, states, controls, rate, s, k, stage, out):
+    for i in range(states.shape[0]):
+        kernel.step(m, w, states[i], controls[i], rate, 0.05, (), s, k, stage, out)
 
 
 def _best(call: Callable[[], object], count: int, tries: int) -> float:
@@ -69,11 +69,14 @@ def main(db: str, name: str, tries: int) -> None:
     model, flown = assemble(coefficients, environment), simulate(case, coefficients)
     states = np.ascontiguousarray(flown.record[:, 1:13])
     controls = np.ascontiguousarray(flown.record[:, 13 : 14 + len(vehicle.planes)])
-    work, dy, stages = kernel.workspace(len(vehicle.planes)), np.zeros(12), np.zeros((6, 12))
+    work, dy = workspace(model), np.zeros(12)
+    flat = (model.real, model.whole)
     rate = np.zeros(controls.shape[1])
     n = len(states)
-    compiled = _best(lambda: _many_rhs(model, states, controls, work, dy, 1), n, tries)
-    step = _best(lambda: _many_steps(model, states, controls, rate, work, stages, dy.copy(), 1), n, tries)
+    compiled = _best(lambda: _many_rhs(*flat, states, controls, work.real, work.whole, dy), n, tries)
+    step = _best(
+        lambda: _many_steps(*flat, states, controls, rate, work.real, work.whole, work.stage, dy.copy()), n, tries
+    )
     few = range(0, n, max(1, n // 200))
     numpy_rhs = _best(lambda: [plain.rhs(model, states[i], controls[i]) for i in few], len(few), max(3, tries // 50))
     worst = 0.0

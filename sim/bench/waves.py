@@ -17,13 +17,15 @@ from numba import njit
 from sim.bench.ratios import _best
 from sim.boat.coefficients import Coefficients
 from sim.boat.database import read_rows
+from sim.boat.mass import Environment
 from sim.boat.vehicle import load_vehicle
 from sim.files.errors import InputError
 from sim.flight.case import load_case
 from sim.flight.simulate import simulate
 from sim.hull.surface import read_geometry
 from sim.kernel import rhs as kernel
-from sim.kernel.assemble import Environment, assemble
+from sim.kernel.assemble import assemble
+from sim.kernel.layout import workspace
 from sim.waves import loads as wave_loads
 from sim.waves.in_waves import surroundings, volume_points, water_around
 from sim.waves.linear import regular
@@ -33,16 +35,10 @@ from sim.waves.surroundings import prepare
 
 
 @njit(cache=True)
-def _calm_steps(m, states, controls, rate, step, work, stages, out):
+def _steps(m, w, states, controls, rate, step, around, s, k, stage, out):
     for i in range(states.shape[0]):
-        kernel.rk4(m, states[i], controls[i], rate, step, work, stages, out)
-
-
-@njit(cache=True)
-def _wave_steps(m, states, controls, rate, step, work, stages, out):
-    for i in range(states.shape[0]):
-        prepare(work.around, states[i], i * step)
-        kernel.rk4(m, states[i], controls[i], rate, step, work, stages, out)
+        prepare(around, states[i], i * step)
+        kernel.step(m, w, states[i], controls[i], rate, step, around, s, k, stage, out)
 
 
 @njit(cache=True)
@@ -57,9 +53,10 @@ def _evaluations(sea, states, sums, value, slope):
         wave_loads.evaluate(sea, states[i], 0.1 * i, sums, value, slope)
 
 
-def _voyage(model, states, controls, rate, step, stages, out, water):
-    work = kernel.workspace(len(model.planes), surroundings(water, model))
-    _wave_steps(model, states, controls, rate, step, work, stages, out)
+def _voyage(model, states, controls, rate, step, out, water):
+    work = workspace(model, surroundings(water, model.added_mass) if water else ())
+    scratch = (work.around, work.real, work.whole, work.stage)
+    _steps(model.real, model.whole, states, controls, rate, step, *scratch, out)
 
 
 def _alternately(calls: list[Callable[[], object]], tries: int) -> list[float]:
@@ -100,8 +97,7 @@ def main(db: str, name: str, components: int, step: float, depth: float, tries: 
     states = np.stack([np.interp(clock, flown.record[:, 0], flown.record[:, k]) for k in range(1, 13)], axis=1)
     states[:, 8] += depth - states[0, 8] - model.sail_top
     controls = np.zeros((len(states), len(vehicle.planes) + 1)) + flown.record[0, 13 : 14 + len(vehicle.planes)]
-    work, stages, out = kernel.workspace(len(vehicle.planes)), np.zeros((6, 12)), np.zeros(12)
-    rate, n = np.zeros(controls.shape[1]), len(states)
+    rate, out, n = np.zeros(controls.shape[1]), np.zeros(12), len(states)
 
     state = sea_state(5)
     density, gravity = environment.density, environment.gravity
@@ -119,13 +115,13 @@ def main(db: str, name: str, components: int, step: float, depth: float, tries: 
     click.echo(f"pressure load, {len(mesh.triangles)} triangles (NumPy)       {1e6 * triangles:8.0f} us")
     click.echo(f"pressure load, {len(volume.volumes)} volume points, 1 component {1e6 * fast:8.2f} us")
     few = states[:: max(1, n // 500)]
-    steps: list[Callable[[], object]] = [lambda: _calm_steps(model, states, controls, rate, step, work, stages, out)]
+    steps: list[Callable[[], object]] = [partial(_voyage, model, states, controls, rate, step, out, None)]
     for water, count in zip(waters, (1, components), strict=True):
         sea, sums = water.sea, wave_loads.passage(water.sea)
         value, slope = np.zeros(sums.value.shape[1]), np.zeros(sums.value.shape[1])
         whole = _best(partial(_evaluations, sea, few, sums, value, slope), len(few), tries)
         click.echo(f"every wave quantity with rates, {count:3d} components {1e6 * whole:8.2f} us")
-        steps.append(partial(_voyage, model, states, controls, rate, step, stages, out, water))
+        steps.append(partial(_voyage, model, states, controls, rate, step, out, water))
     calm, single, seaway = (t / n for t in _alternately(steps, tries))
     click.echo(f"{n} states along {case.name} from D0 = {depth} m, step {step} s")
     click.echo(f"RK4 step, calm                              {1e6 * calm:8.2f} us")

@@ -10,13 +10,13 @@ from pydantic import Field, model_validator
 
 from sim.boat.catalogue import STATES
 from sim.files.schema import Data
-from sim.flight import events, maneuver
-from sim.flight.events import Programme
+from sim.flight import orders
+from sim.flight.orders import Programme
 
 Positive = Annotated[float, Field(gt=0)]
 _ANGLES, _RATES = ("phi", "theta", "psi"), ("p", "q", "r")
 _WATCHED = (*STATES, "U", "point_depth")
-_LAWS = {"fixed": maneuver.FIXED, "pid": maneuver.PID, "zigzag": maneuver.ZIGZAG, "programme": maneuver.PROGRAMME}
+_LAWS = {"fixed": orders.FIXED, "pid": orders.PID, "zigzag": orders.ZIGZAG, "programme": orders.PROGRAMME}
 
 
 class Event(Data):
@@ -55,17 +55,17 @@ class Event(Data):
     def row(self, sail_top: float) -> list[float]:
         """The event as the compiled loop reads it."""
         if self.after_s is not None:
-            return [events.AFTER, 0.0, self.after_s, 0.0, 0.0, 0.0, 0.0]
+            return [orders.AFTER, 0.0, self.after_s, 0.0, 0.0, 0.0, 0.0]
         channel = "z" if self.channel == "D0" else str(self.channel)
         unit = math.pi / 180.0 if channel in _ANGLES + _RATES else 1.0
         offset = sail_top if self.channel == "D0" else 0.0
         kind, value = next(
             (code, amount * unit - shift)
             for code, amount, shift in (
-                (events.ABOVE, self.above, offset),
-                (events.BELOW, self.below, offset),
-                (events.CHANGE, self.change, 0.0),
-                (events.STEADY, self.steady, 0.0),
+                (orders.ABOVE, self.above, offset),
+                (orders.BELOW, self.below, offset),
+                (orders.CHANGE, self.change, 0.0),
+                (orders.STEADY, self.steady, 0.0),
             )
             if amount is not None
         )
@@ -100,12 +100,12 @@ class PlaneStep(Data):
     def row(self, trim: float) -> tuple[int, float, list[float]]:
         """Mode, command [rad] and shifts of the targets."""
         if self.hold:
-            return maneuver.PID, 0.0, [self.distance_m, math.radians(self.angle_deg)]
+            return orders.PID, 0.0, [self.distance_m, math.radians(self.angle_deg)]
         if self.yaw_rate_degps is not None:
-            return maneuver.YAW_RATE, 0.0, [0.0, math.radians(self.yaw_rate_degps)]
+            return orders.YAW_RATE, 0.0, [0.0, math.radians(self.yaw_rate_degps)]
         if self.value_deg is not None:
-            return maneuver.FIXED, math.radians(self.value_deg), [0.0, 0.0]
-        return maneuver.FIXED, trim + math.radians(self.from_trim_deg or 0.0), [0.0, 0.0]
+            return orders.FIXED, math.radians(self.value_deg), [0.0, 0.0]
+        return orders.FIXED, trim + math.radians(self.from_trim_deg or 0.0), [0.0, 0.0]
 
 
 class PlaneCommand(Data):
@@ -172,9 +172,9 @@ class SpeedStep(Data):
     def row(self, initial: float) -> tuple[int, float, list[float]]:
         """Mode, revolutions [1/s], no shifts."""
         if self.hold:
-            return maneuver.PID, 0.0, [0.0, 0.0]
+            return orders.PID, 0.0, [0.0, 0.0]
         value = self.value_rps if self.value_rps is not None else initial * (self.times_initial or 0.0)
-        return maneuver.FIXED, value, [0.0, 0.0]
+        return orders.FIXED, value, [0.0, 0.0]
 
 
 class SpeedCommand(Data):
@@ -264,7 +264,7 @@ def compile_programme(
     rows: list[list[tuple[int, float, list[float]]]] = [
         [s.row(t) for s in c.step] for c, t in zip((command.dV, command.dH), trim, strict=True)
     ]
-    rows += [[s.row(revolutions) for s in command.n.step], [(maneuver.FIXED, 0.0, [0.0, 0.0])] if stop else []]
+    rows += [[s.row(revolutions) for s in command.n.step], [(orders.FIXED, 0.0, [0.0, 0.0])] if stop else []]
     ends = [s.until for c in (command.dV, command.dH, command.n) for s in c.step] + ([stop] if stop else [])
     flat = [r for axis in rows for r in axis]
     count = np.array([len(axis) for axis in rows], dtype=np.int64)

@@ -1,131 +1,110 @@
 """What ends a step of a programme, or the run: compiled, located inside a time step.
 
 An event is a row (kind, channel, value, hold, x, y, z). Its function is negative before the
-event and not negative from it on, so that a bisection over the time step finds it.
+event and not negative from it on, so that a bisection over the time step finds it. Arguments
+``g``, ``q``, ``f``, ``j`` are settings and progress of ``sim.flight.orders``.
 """
 
 from __future__ import annotations
 
 from math import cos, sin, sqrt
-from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
-AFTER, ABOVE, BELOW, CHANGE, STEADY = 0, 1, 2, 3, 4
-# Channels are the twelve states, then these.
-SPEED, POINT_DEPTH = 12, 13
-# Axes of a programme; the fourth holds the events that end the run.
-VERTICAL, HORIZONTAL, REVOLUTIONS, RUN = 0, 1, 2, 3
-N_AXES = 4
-
-
-class Programme(NamedTuple):
-    """Steps of commands and the events that end them.
-
-    first, steps : (4,) first step of each axis (dV, dH, n, run) and how many.
-    mode : (k,) law while the step lasts; value : (k,) fixed command [rad or 1/s].
-    shift : (k, 2) move of the autopilot's targets: distance [m] and angle [rad], or the
-        yaw rate to hold [rad/s].
-    event_first : (k + 1,) first event of each step; events : (e, 7) as above.
-    """
-
-    first: np.ndarray
-    steps: np.ndarray
-    mode: np.ndarray
-    value: np.ndarray
-    shift: np.ndarray
-    event_first: np.ndarray
-    events: np.ndarray
+from sim.compiled import inner
+from sim.flight.orders import (
+    ABOVE,
+    AFTER,
+    AT_EVENT_FIRST,
+    AT_EVENTS,
+    BELOW,
+    EVENT,
+    FIRST_STEP,
+    N_AXES,
+    N_STATES,
+    N_STEPS,
+    QUIET,
+    SINCE,
+    SPEED,
+    START,
+    STEADY,
+)
 
 
-class Progress(NamedTuple):
-    """Where a run is in its programme.
-
-    sense : (1,) sign of the zigzag leg. at : (4,) step of each axis. since : (4,) its start
-    [s]. start : (4, 12) the state then. quiet : (e,) since when each channel is steady [s].
-    """
-
-    sense: np.ndarray
-    at: np.ndarray
-    since: np.ndarray
-    start: np.ndarray
-    quiet: np.ndarray
-
-
-def progress(programme: Programme, y0: np.ndarray) -> Progress:
-    """The start of a run in state ``y0``."""
-    start = np.tile(y0, (N_AXES, 1))
-    zeros = np.zeros(len(programme.events))
-    return Progress(np.ones(1), np.zeros(N_AXES, dtype=np.int64), np.zeros(N_AXES), start, zeros)
-
-
-@njit(cache=True, error_model="numpy")
-def channel_value(y: np.ndarray, event: np.ndarray) -> float:
-    """The watched channel of a state, SI and radians."""
-    channel = int(event[1])
-    if channel < 12:
-        return y[channel]
+@inner
+def _channel_value(y: np.ndarray, at: int, g: np.ndarray, event: int) -> float:
+    """The channel that an event watches, SI and radians, of the state that starts at ``y[at]``."""
+    channel = int(g[event + 1])
+    if channel < N_STATES:
+        return y[at + channel]
     if channel == SPEED:
-        return sqrt(y[0] ** 2 + y[1] ** 2 + y[2] ** 2)
-    st, ct = sin(y[10]), cos(y[10])
-    return y[8] - st * event[4] + sin(y[9]) * ct * event[5] + cos(y[9]) * ct * event[6]
+        return sqrt(y[at] ** 2 + y[at + 1] ** 2 + y[at + 2] ** 2)
+    phi, theta = y[at + 9], y[at + 10]
+    st, ct = sin(theta), cos(theta)
+    return y[at + 8] - st * g[event + 4] + sin(phi) * ct * g[event + 5] + cos(phi) * ct * g[event + 6]
 
 
-@njit(cache=True, error_model="numpy")
-def _channel_rate(y: np.ndarray, dy: np.ndarray, event: np.ndarray) -> float:
-    channel = int(event[1])
-    if channel < 12:
+@inner
+def _channel_rate(y: np.ndarray, dy: np.ndarray, g: np.ndarray, event: int) -> float:
+    channel = int(g[event + 1])
+    if channel < N_STATES:
         return dy[channel]
-    return (y[0] * dy[0] + y[1] * dy[1] + y[2] * dy[2]) / max(channel_value(y, event), 1e-12)
+    return (y[0] * dy[0] + y[1] * dy[1] + y[2] * dy[2]) / max(_channel_value(y, 0, g, event), 1e-12)
 
 
-@njit(cache=True, error_model="numpy")
-def step_past(p: Programme, run: Progress, axis: int, y: np.ndarray, t: float) -> float:
+@inner
+def _events(q: np.ndarray, j: np.ndarray, axis: int) -> tuple[int, int]:
+    """First event of the present step of an axis, and the one after its last; none after the last step."""
+    if j[axis] >= q[N_STEPS + axis]:
+        return 0, 0
+    k = q[AT_EVENT_FIRST] + q[FIRST_STEP + axis] + j[axis]
+    return q[k], q[k + 1]
+
+
+@inner
+def step_past(g: np.ndarray, q: np.ndarray, f: np.ndarray, j: np.ndarray, axis: int, y: np.ndarray, t: float) -> float:
     """Not negative once an event of the present step of an axis has happened."""
-    found = -1.0
-    if run.at[axis] >= p.steps[axis]:
-        return found
-    k = p.first[axis] + run.at[axis]
-    for e in range(p.event_first[k], p.event_first[k + 1]):
-        event = p.events[e]
-        kind = int(event[0])
+    latest = -np.inf
+    first, end = _events(q, j, axis)
+    for e in range(first, end):
+        event = q[AT_EVENTS] + EVENT * e
+        kind = int(g[event])
         if kind == AFTER:
-            past = t - run.since[axis] - event[2]
+            past = t - f[SINCE + axis] - g[event + 2]
         elif kind == STEADY:
-            past = t - run.quiet[e] - event[3]
+            past = t - f[QUIET + e] - g[event + 3]
         elif kind == ABOVE:
-            past = channel_value(y, event) - event[2]
+            past = _channel_value(y, 0, g, event) - g[event + 2]
         elif kind == BELOW:
-            past = event[2] - channel_value(y, event)
+            past = g[event + 2] - _channel_value(y, 0, g, event)
         else:
-            past = abs(channel_value(y, event) - channel_value(run.start[axis], event)) - event[2]
-        if e == p.event_first[k] or past > found:
-            found = past
-    return found
+            begun = _channel_value(f, START + N_STATES * axis, g, event)
+            past = abs(_channel_value(y, 0, g, event) - begun) - g[event + 2]
+        latest = max(latest, past)
+    return latest if first < end else -1.0
 
 
-@njit(cache=True, error_model="numpy")
-def watch(p: Programme, run: Progress, y: np.ndarray, dy: np.ndarray, t: float) -> None:
+@inner
+def watch(g: np.ndarray, q: np.ndarray, f: np.ndarray, j: np.ndarray, y: np.ndarray, dy: np.ndarray, t: float) -> None:
     """Note which channels are not steady at this sample."""
     for axis in range(N_AXES):
-        if run.at[axis] >= p.steps[axis]:
-            continue
-        k = p.first[axis] + run.at[axis]
-        for e in range(p.event_first[k], p.event_first[k + 1]):
-            if p.events[e, 0] == STEADY and abs(_channel_rate(y, dy, p.events[e])) > p.events[e, 2]:
-                run.quiet[e] = t
+        first, end = _events(q, j, axis)
+        for e in range(first, end):
+            event = q[AT_EVENTS] + EVENT * e
+            if g[event] == STEADY and abs(_channel_rate(y, dy, g, event)) > g[event + 2]:
+                f[QUIET + e] = t
 
 
-@njit(cache=True, error_model="numpy")
-def advance(p: Programme, run: Progress, axis: int, y: np.ndarray, t: float) -> bool:
+@inner
+def advance(q: np.ndarray, f: np.ndarray, j: np.ndarray, axis: int, y: np.ndarray, t: float) -> bool:
     """Go to the next step of an axis; false when there is none."""
-    if run.at[axis] + 1 >= p.steps[axis]:
+    if j[axis] + 1 >= q[N_STEPS + axis]:
         return False
-    run.at[axis] += 1
-    run.since[axis] = t
-    run.start[axis] = y
-    k = p.first[axis] + run.at[axis]
-    for e in range(p.event_first[k], p.event_first[k + 1]):
-        run.quiet[e] = t
+    j[axis] += 1
+    f[SINCE + axis] = t
+    for i in range(N_STATES):
+        f[START + N_STATES * axis + i] = y[i]
+    first, end = _events(q, j, axis)
+    for e in range(first, end):
+        f[QUIET + e] = t
     return True

@@ -11,13 +11,12 @@ from sim.boat.coefficients import Coefficients
 from sim.boat.database import read_rows
 from sim.boat.vehicle import load_vehicle
 from sim.files.errors import InputError
-from sim.flight import maneuver
+from sim.flight import maneuver, orders
 from sim.flight.case import Case, load_case
 from sim.flight.commands import Commands, PlaneCommand, SpeedCommand
-from sim.flight.events import progress
 from sim.flight.simulate import TANKS, columns_of, initial_state, model_of, settings_of, uses_tanks, water_of
 from sim.kernel.assemble import weight_across
-from sim.kernel.rhs import workspace
+from sim.kernel.layout import workspace
 from sim.waves.in_waves import surroundings
 
 Array = NDArray[np.float64]
@@ -115,8 +114,8 @@ class Plant:
         planes = len(self.vehicle.planes)
         level = (self.trim.dV, self.trim.dH) if self.trim else (0.0, 0.0)
         self.commands = dict(zip(COMMANDS, (*level, *self.controls[planes:].tolist()), strict=False))
-        around = surroundings(self._water, self._model) if self._water else ()
-        self._work = workspace(planes, around)
+        around = surroundings(self._water, self._model.added_mass) if self._water else ()
+        self._work = workspace(self._model, around)
 
     def __getitem__(self, channel: str) -> float:
         """A state, a plane, n, ballast or trim_tank by name; ``t``, ``U`` and ``D0`` too.
@@ -159,17 +158,21 @@ class Plant:
         self.commands |= {name: float(value) for name, value in commands.items()}
         settings = self._commanded()
         record, executes, log = np.zeros((1, 15 + self.controls.size)), np.zeros((1, 2)), np.zeros((1, 3))
-        state = progress(settings.programme, self.state)
+        work = self._work
         self.time = maneuver.run(
-            self._model,
-            settings,
-            state,
+            self._model.real,
+            self._model.whole,
+            *orders.flat(settings),
+            *orders.progress(settings, self.state),
             self.state,
             self.controls,
             self.dt,
             steps,
             steps,
-            self._work,
+            work.around,
+            work.real,
+            work.whole,
+            work.stage,
             record,
             executes,
             log,
@@ -189,7 +192,7 @@ class Plant:
         if name in ("dV", "dH") and abs(value) > math.pi:
             raise InputError(f"plant, command {name}", f"{value:g}", "radians, between -pi and pi")
 
-    def _commanded(self) -> maneuver.Settings:
+    def _commanded(self) -> orders.Settings:
         """The loop's settings with the present commands as fixed ones."""
         given, limit = self.commands, self._settings.n_limit
         tanks = [given.get(name, 0.0) for name in TANKS]

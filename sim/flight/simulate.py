@@ -10,14 +10,15 @@ from numpy.typing import NDArray
 
 from sim.boat.catalogue import STATES
 from sim.boat.coefficients import Coefficients
+from sim.boat.mass import Environment
 from sim.boat.vehicle import Vehicle
 from sim.files.errors import InputError
-from sim.flight import maneuver
+from sim.flight import maneuver, orders
 from sim.flight.case import Case
 from sim.flight.commands import compile_programme, law_code
 from sim.flight.trim import Trim, self_propulsion
-from sim.kernel.assemble import Environment, assemble, weight_across, with_tanks
-from sim.kernel.rhs import Model
+from sim.kernel.assemble import assemble, weight_across, with_tanks
+from sim.kernel.layout import Model
 from sim.waves.in_waves import Water, surroundings, water_around
 from sim.waves.linear import Waves, calm, regular
 from sim.waves.spectra import Spectrum, realise, sea_state
@@ -156,7 +157,7 @@ def initial_state(case: Case, vehicle: Vehicle, model: Model) -> tuple[Array, Ar
     state = np.zeros(12)
     state[0], state[8] = first.speed_mps, first.depth_m - model.sail_top
     state[9], state[10] = math.radians(first.heel_deg), math.radians(first.pitch_deg)
-    tanks = _held(case) if model.tank else ()
+    tanks = _held(case) if model.has_tanks else ()
     return state, np.array([*np.zeros(len(vehicle.planes)), first.revolutions_rps or 0.0, *tanks]), None
 
 
@@ -165,10 +166,12 @@ def uses_tanks(case: Case) -> bool:
     return bool(case.command.ballast or case.command.trim_tank or case.initial.trim != "planes")
 
 
-def _tank_settings(case: Case, vehicle: Vehicle, controls: Array) -> tuple[Array, Array, Array, Array, Array]:
+def _tank_settings(
+    case: Case, vehicle: Vehicle, controls: Array
+) -> tuple[NDArray[np.int64], Array, Array, Array, Array]:
     """Laws, start, gains, limits and rates of ballast and trim tank."""
     commands = (case.command.ballast, case.command.trim_tank)
-    laws = np.array([law_code(c.law) if c else maneuver.FIXED for c in commands])
+    laws = np.array([law_code(c.law) if c else orders.FIXED for c in commands])
     gains = np.array([c.gains() if c else np.zeros(6) for c in commands])
     if vehicle.tanks is None or not uses_tanks(case):
         return laws, np.zeros(2), gains, np.zeros(2), np.zeros(2)
@@ -177,7 +180,7 @@ def _tank_settings(case: Case, vehicle: Vehicle, controls: Array) -> tuple[Array
     return laws, controls[-2:].copy(), gains, np.array(limit), np.array(rate)
 
 
-def settings_of(case: Case, vehicle: Vehicle, state: Array, controls: Array, trim: Trim | None) -> maneuver.Settings:
+def settings_of(case: Case, vehicle: Vehicle, state: Array, controls: Array, trim: Trim | None) -> orders.Settings:
     """The compiled loop's settings for a case."""
     dv, dh, n = case.command.dV, case.command.dH, case.command.n
     limit, rate = plane_limits(vehicle)
@@ -186,7 +189,7 @@ def settings_of(case: Case, vehicle: Vehicle, state: Array, controls: Array, tri
     commands = (trim.dV, trim.dH) if trim else (0.0, 0.0)
     tank_law, tank_start, tank_gains, tank_limit, tank_rate = _tank_settings(case, vehicle, controls)
     sail_top = vehicle.particulars.sail_top.value[2]
-    return maneuver.Settings(
+    return orders.Settings(
         law=np.array([law_code(dv.law), law_code(dh.law)]),
         value=np.array(value),
         check=np.radians([dv.check_deg, dh.check_deg]),
@@ -243,10 +246,10 @@ def fly(case: Case, vehicle: Vehicle, model: Model, water: Water | None) -> Simu
         model = weight_across(model, trim.lateral)
     settings = settings_of(case, vehicle, state, controls, trim)
     dt, (steps, every) = case.run.step_s, samples_of(case)
-    around = surroundings(water, model) if water else ()
+    around = surroundings(water, model.added_mass) if water else ()
     flown = maneuver.fly_logged(model, settings, state, controls, dt, steps, every, around)
     return Simulation(
-        columns=columns_of(vehicle, bool(model.tank)),
+        columns=columns_of(vehicle, model.has_tanks),
         record=flown.record,
         executes=flown.executes,
         trim=trim,

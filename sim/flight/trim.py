@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from scipy.optimize import root
 
 from sim.kernel import rhs as kernel
+from sim.kernel.layout import Model, workspace
 
 Array = NDArray[np.float64]
 
@@ -57,7 +58,7 @@ TANK_NAMES = ("ballast", "trim_tank")
 
 
 def _solve(
-    model: kernel.Model,
+    model: Model,
     mixer: Array,
     speed: float,
     depth: float,
@@ -71,7 +72,7 @@ def _solve(
     -------
     The state found and, if it is no equilibrium, what is wrong with it.
     """
-    work, derivative = kernel.workspace(mixer.shape[0]), np.zeros(12)
+    work, derivative = workspace(model), np.zeros(12)
     # n relative to U/D: an advance coefficient near one. Tanks by what balances 1 % of weight.
     reference = speed / model.diameter
     size = {"pitch": 1.0, "dV": 1.0, "ballast": 0.01 * model.mass, "trim_tank": 1.0}
@@ -91,12 +92,12 @@ def _solve(
         state = np.zeros(12)
         state[:3] = u * scale, v * scale, w * scale
         state[8], state[9], state[10] = depth - model.sail_top, heel, pitch
-        tanks = [level[k] for k in TANK_NAMES] if model.tank else []
+        tanks = [level[k] for k in TANK_NAMES] if model.has_tanks else []
         return state, np.array([*(mixer @ np.array([level["dV"], dh])), n * reference, *tanks]), level
 
-    def weighted(x: Array) -> kernel.Model:
+    def weighted(x: Array) -> Model:
         # Where nothing accelerates, the weight's place matters and the mass matrix does not.
-        return model._replace(r_g=(x_g, y_g + float(x[3]), z_g)) if upright else model
+        return model.replaced(r_g=(x_g, y_g + float(x[3]), z_g)) if upright else model
 
     def residual(x: Array) -> Array:
         state, controls, _ = build(x)
@@ -129,7 +130,7 @@ def _closest(state: Array, controls: Array, mixer: Array) -> str:
 
 
 def self_propulsion(
-    model: kernel.Model,
+    model: Model,
     mixer: Array,
     speed: float,
     depth: float,
@@ -168,7 +169,7 @@ def self_propulsion(
         found, wrong = _solve(model, mixer, speed, depth, free, values, upright)
         if wrong:
             raise NoEquilibrium(wrong)
-        amounts = dict(zip(TANK_NAMES, found.controls[mixer.shape[0] + 1 :], strict=bool(model.tank)))
+        amounts = dict(zip(TANK_NAMES, found.controls[mixer.shape[0] + 1 :], strict=model.has_tanks))
         over = [k for k in reversed(TANK_NAMES) if k in free and abs(amounts[k]) > limits[k]]
         if not over:
             break

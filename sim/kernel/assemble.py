@@ -3,82 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-from sim.boat.catalogue import ACCELERATIONS, BOAT_FEATURES, OUTPUTS, PLANE_FEATURES, feature_index
+from sim.boat.catalogue import BOAT_FEATURES, OUTPUTS, PLANE_FEATURES, feature_index
 from sim.boat.coefficients import Coefficient, Coefficients
+from sim.boat.mass import (
+    Environment,
+    added_mass_matrix,
+    cross_matrix,
+    rigid_body_matrix,
+    unit_added_masses,
+)
 from sim.boat.vehicle import Vehicle
-from sim.kernel import rhs as kernel
+from sim.kernel import layout
+from sim.kernel.layout import Group, Model
 
 Array = NDArray[np.float64]
-_RULES = {"hold": kernel.HOLD, "linear": kernel.LINEAR, "linear_load": kernel.LINEAR_LOAD}
-MAX_FACTORS = 4
+_RULES = {"hold": layout.HOLD, "linear": layout.LINEAR, "linear_load": layout.LINEAR_LOAD}
 # Order of the kernel's inertia: Ixx Iyy Izz Ixy Ixz Iyz.
 _INERTIA = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
-
-
-@dataclass(frozen=True)
-class Environment:
-    """Water density [kg/m^3] and gravity [m/s^2]."""
-
-    density: float
-    gravity: float
-
-
-def cross_matrix(r: Iterable[float]) -> Array:
-    """The matrix [r]x with [r]x a = r x a."""
-    x, y, z = r
-    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-
-
-def rigid_body_matrix(vehicle: Vehicle) -> tuple[Array, Array]:
-    """Rigid-body mass matrix about the origin, Eq. (14) as corrected.
-
-    Returns
-    -------
-    mass : (6, 6) [kg, kg m, kg m^2].
-    inertia : (3, 3) inertia about the origin.
-    """
-    particulars = vehicle.particulars
-    m = particulars.mass.value
-    lever = cross_matrix(particulars.centre_of_gravity.value)
-    inertia = m * (np.diag(np.square(particulars.radius_of_gyration.value)) - lever @ lever)
-    return np.block([[m * np.eye(3), -m * lever], [m * lever, inertia]]), inertia
-
-
-def _added_masses(coefficients: Coefficients, environment: Environment) -> list[tuple[Coefficient, Array]]:
-    """Each acceleration coefficient in use, with the (6, 6) added mass of a value of one.
-
-    From sections, Eqs. (36)-(41): A = sum J^T diag(c m) J with J = [1, -[r]x]; or from the
-    whole-boat derivatives, as the vehicle declares.
-    """
-    vehicle = coefficients.vehicle
-    length, diameter = vehicle.particulars.length.value, vehicle.propeller.diameter.value
-    found = []
-    centres = {s.name: s.position for s in vehicle.sections.centres} if vehicle.sections else {}
-    for coefficient in coefficients:
-        term = coefficient.term
-        if not term.is_acceleration or (coefficient.part in centres) != (vehicle.added_mass == "sections"):
-            continue
-        unit, load = np.zeros((6, 6)), term.scale(environment.density, length, diameter)
-        i, j = OUTPUTS.index(term.output), ACCELERATIONS.index(term.factors[0])
-        if coefficient.part in centres:
-            motion = np.hstack([np.eye(3), -cross_matrix(centres[coefficient.part])])
-            unit = -load * np.outer(motion[i], motion[j])
-        else:
-            unit[i, j] = -load
-        found.append((coefficient, unit))
-    return found
-
-
-def added_mass_matrix(coefficients: Coefficients, environment: Environment) -> Array:
-    """Added mass about the origin, (6, 6) [kg, kg m, kg m^2]; zero when nothing was identified."""
-    parts = _added_masses(coefficients, environment)
-    return np.array(sum((float(c.values[0]) * unit for c, unit in parts), np.zeros((6, 6))))
 
 
 def _refine(grid: Array, axis: int, old: Array, new: Array) -> Array:
@@ -112,9 +58,11 @@ def _group_key(coefficient: Coefficient) -> tuple[object, ...]:
     return coefficient.term.axes, rules, plane, exact
 
 
-def _triple(values: list[float]) -> tuple[float, float, float]:
-    x, y, z = (float(v) for v in values)
-    return x, y, z
+def _slot(coefficient: Coefficient) -> int:
+    """Where a coefficient stands in its group: its load, thrust or thrust deduction."""
+    if coefficient.term.name == "t":
+        return layout.OUT_DEDUCTION
+    return layout.OUT_THRUST if coefficient.term.name == "KT" else OUTPUTS.index(coefficient.term.output)
 
 
 class _Flat:
@@ -125,22 +73,17 @@ class _Flat:
         self.planes = [p.name for p in vehicle.planes]
         self.one = len(BOAT_FEATURES) + len(PLANE_FEATURES) * len(self.planes)
         self.scale = (environment.density, vehicle.particulars.length.value, vehicle.propeller.diameter.value)
-        self.group: list[list[int]] = []
-        self.link: list[list[int]] = []
+        self.groups: list[Group] = []
         self.axis: dict[tuple[int, int, bytes], list[int]] = {}
         self.order: dict[tuple[int, int, bytes], int] = {}
         self.nodes: list[float] = []
-        self.data: list[Array] = []
+        self.data: list[Array] = [np.zeros((0, layout.WIDTH))]
         self.size = 0
-        self.coefficient: list[tuple[int, float, list[int]]] = []
+        # An empty slot is multiplied by one; its coefficients are zero.
+        self.multipliers: dict[tuple[int, ...], int] = {(self.one,) * layout.MAX_FACTORS: 0}
 
     def feature(self, factor: str, part: str) -> int:
         return feature_index(factor, self.planes.index(part) if part in self.planes else -1)
-
-    def output(self, coefficient: Coefficient) -> int:
-        if coefficient.term.name == "t":
-            return kernel.OUT_DEDUCTION
-        return kernel.OUT_THRUST if coefficient.term.name == "KT" else OUTPUTS.index(coefficient.term.output)
 
     def axis_index(self, feature: int, rule: int, nodes: Array) -> int:
         """Axes with the same feature, rule and nodes are located once per evaluation."""
@@ -151,36 +94,39 @@ class _Flat:
             self.nodes += list(nodes)
         return self.order[key]
 
+    def scale_of(self, member: Coefficient) -> float:
+        return member.term.sign * member.term.scale(*self.scale)
+
     def add_group(self, members: list[Coefficient]) -> None:
         first = members[0]
         rules = _group_key(first)[1]
         union = _union(members)
-        grids = [_on(union, member, member.values) for member in members]
-        grids += [np.zeros_like(grids[0])] * (kernel.WIDTH - len(grids))
-        block = np.stack(grids, axis=-1)
-        start = len(self.link)
+        block = np.zeros((*(nodes.size for nodes in union), layout.WIDTH))
+        multipliers = [0] * layout.WIDTH
+        for member in members:
+            slot = _slot(member)
+            block[..., slot] = self.scale_of(member) * _on(union, member, member.values)
+            factors = [self.feature(f, member.part) for f in member.term.factors]
+            factors += [self.one] * (layout.MAX_FACTORS - len(factors))
+            multipliers[slot] = self.multipliers.setdefault(tuple(factors), len(self.multipliers))
+        axes, strides = [], []
         for k, (name, nodes) in enumerate(zip(first.term.axes, union, strict=True)):
             if nodes.size > 1:
                 feature, rule = self.feature(name, first.part), _RULES[rules[k]]  # type: ignore[index]
-                stride = int(np.prod(block.shape[k + 1 : -1]))
-                self.link.append([self.axis_index(feature, rule, nodes), stride])
-        self.group.append([start, len(self.link) - start, len(self.coefficient), len(members), self.size])
-        self.data.append(block.reshape(-1, kernel.WIDTH))
+                axes.append(self.axis_index(feature, rule, nodes))
+                strides.append(int(np.prod(block.shape[k + 1 : -1])))
+        self.groups.append(Group(tuple(axes), tuple(strides), self.size, tuple(multipliers)))
+        self.data.append(block.reshape(-1, layout.WIDTH))
         self.size += len(self.data[-1])
-        for member in members:
-            factors = [self.feature(f, member.part) for f in member.term.factors]
-            factors += [self.one] * (MAX_FACTORS - len(factors))
-            scale = member.term.sign * member.term.scale(*self.scale)
-            self.coefficient.append((self.output(member), scale, factors))
 
 
-def with_tanks(model: kernel.Model, vehicle: Vehicle) -> kernel.Model:
+def with_tanks(model: Model, vehicle: Vehicle) -> Model:
     """The model with ballast and trim tank in use; its controls have two more entries."""
     assert vehicle.tanks is not None
-    return model._replace(tank=_triple(vehicle.tanks.ballast.position.value))
+    return model.replaced(tanks=True, tank=vehicle.tanks.ballast.position.value)
 
 
-def weight_across(model: kernel.Model, lateral: float) -> kernel.Model:
+def weight_across(model: Model, lateral: float) -> Model:
     """The model with its whole weight shifted to starboard, in the loads and in the mass matrix.
 
     Parameters
@@ -193,26 +139,32 @@ def weight_across(model: kernel.Model, lateral: float) -> kernel.Model:
     mass = model.mass_matrix + np.block([[np.zeros((3, 3)), -first], [first, second]])
     ixx, iyy, izz, ixy, ixz, iyz = model.inertia
     moved = np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]]) + second
-    return model._replace(
+    return model.replaced(
         mass_matrix=mass,
         inverse_mass=np.linalg.inv(mass),
         r_g=(x, y + lateral, z),
-        inertia=tuple(float(moved[i, j]) for i, j in _INERTIA),  # type: ignore[arg-type]
+        inertia=[moved[i, j] for i, j in _INERTIA],
     )
 
 
 def _batches(coefficients: Coefficients) -> Iterable[list[Coefficient]]:
-    """Coefficients that share their axes, at most ``WIDTH`` at a time, in the order of the kernel."""
-    groups: dict[tuple[object, ...], list[Coefficient]] = {}
+    """Coefficients that share their axes, one a slot, in the order of the kernel."""
+    groups: dict[tuple[object, ...], list[list[Coefficient]]] = {}
     for coefficient in coefficients:
-        if not coefficient.term.is_acceleration and coefficient.term.name != "w_T":
-            groups.setdefault(_group_key(coefficient), []).append(coefficient)
-    for members in groups.values():
-        for i in range(0, len(members), kernel.WIDTH):
-            yield members[i : i + kernel.WIDTH]
+        if coefficient.term.is_acceleration or coefficient.term.name == "w_T":
+            continue
+        batches = groups.setdefault(_group_key(coefficient), [])
+        slot = _slot(coefficient)
+        free = next((b for b in batches if all(_slot(member) != slot for member in b)), None)
+        if free is None:
+            batches.append([coefficient])
+        else:
+            free.append(coefficient)
+    for batches in groups.values():
+        yield from batches
 
 
-def assemble(coefficients: Coefficients, environment: Environment) -> kernel.Model:
+def assemble(coefficients: Coefficients, environment: Environment) -> Model:
     """The compiled kernel's model of a vehicle.
 
     Parameters
@@ -231,33 +183,31 @@ def assemble(coefficients: Coefficients, environment: Environment) -> kernel.Mod
     mass, inertia = rigid_body_matrix(vehicle)
     wake = coefficients.get("w_T")
     particulars = vehicle.particulars
-    if len(flat.axis) > kernel.MAX_AXES:
-        raise ValueError(f"{vehicle.name}: {len(flat.axis)} table axes, at most {kernel.MAX_AXES}")
     added = added_mass_matrix(coefficients, environment)
     total = mass + added
+    numbers = {
+        "mass": particulars.mass.value,
+        "weight": particulars.mass.value * environment.gravity,
+        "buoyancy": particulars.displaced_mass.value * environment.gravity,
+        "r_g": particulars.centre_of_gravity.value,
+        "r_b": particulars.centre_of_buoyancy.value,
+        "inertia": [inertia[i, j] for i, j in _INERTIA],
+        "sail_top": particulars.sail_top.value[2],
+        "diameter": vehicle.propeller.diameter.value,
+        "wake": float(wake.values[0]) if wake else 0.0,
+        "mass_matrix": total,
+        "added_mass": added,
+        "inverse_mass": np.linalg.inv(total),
+    }
     planes = [[*p.position, *p.lift_axis] for p in vehicle.planes]
-    return kernel.Model(
-        inverse_mass=np.linalg.inv(total),
-        mass=particulars.mass.value,
-        weight=particulars.mass.value * environment.gravity,
-        buoyancy=particulars.displaced_mass.value * environment.gravity,
-        r_g=_triple(particulars.centre_of_gravity.value),
-        r_b=_triple(particulars.centre_of_buoyancy.value),
-        inertia=tuple(float(inertia[i, j]) for i, j in _INERTIA),  # type: ignore[arg-type]
-        sail_top=particulars.sail_top.value[2],
-        diameter=vehicle.propeller.diameter.value,
-        wake=float(wake.values[0]) if wake else 0.0,
-        planes=np.array(planes, dtype=float).reshape(-1, 6),
-        groups=np.array(flat.group, dtype=np.int64).reshape(-1, 5),
-        links=np.array(flat.link, dtype=np.int64).reshape(-1, 2),
+    return layout.pack(
+        numbers,
+        planes=np.array(planes, dtype=float).reshape(-1, layout.PLANE_WIDTH),
         axes=np.array(list(flat.axis.values()), dtype=np.int64).reshape(-1, 4),
         nodes=np.array(flat.nodes, dtype=float),
-        data=np.concatenate(flat.data) if flat.data else np.zeros((0, kernel.WIDTH)),
-        terms=np.array([[k[0], *k[2]] for k in flat.coefficient], dtype=np.int64).reshape(-1, 1 + MAX_FACTORS),
-        scale=np.array([k[1] for k in flat.coefficient], dtype=float),
-        mass_matrix=total,
-        added_mass=added,
-        tank=(),
+        groups=tuple(flat.groups),
+        multipliers=np.array(list(flat.multipliers), dtype=np.int64).reshape(-1, layout.MAX_FACTORS),
+        data=np.concatenate(flat.data),
     )
 
 
@@ -275,33 +225,34 @@ class Assembly:
     def __init__(self, coefficients: Coefficients, environment: Environment) -> None:
         self._base = assemble(coefficients, environment)
         places = coefficients.places
+        flat = _Flat(coefficients, environment)
         weight, node, row, first = [np.zeros(0)], [np.zeros(0, dtype=int)], [np.zeros(0, dtype=int)], 0
         for members in _batches(coefficients):
             union = _union(members)
-            for slot, member in enumerate(members):
+            for member in members:
                 grid = _on(union, member, np.eye(member.values.size)).reshape(-1, member.values.size)
                 i, j = np.nonzero(grid)
-                weight.append(grid[i, j])
-                node.append((first + i) * kernel.WIDTH + slot)
+                weight.append(flat.scale_of(member) * grid[i, j])
+                node.append((first + i) * layout.WIDTH + _slot(member))
                 row.append(places[member.term.name, member.part][j])
             first += int(np.prod([nodes.size for nodes in union]))
         shape = (self._base.data.size, sum(p.size for p in places.values()))
         entries = (np.concatenate(weight), (np.concatenate(node), np.concatenate(row)))
         self._data = csr_array(entries, shape=shape)
-        parts = _added_masses(coefficients, environment)
+        parts = unit_added_masses(coefficients, environment)
         self._added = np.array([places[c.term.name, c.part][0] for c, _ in parts], dtype=int)
         self._units = np.array([unit for _, unit in parts]).reshape(-1, 6, 6)
         self._rigid = rigid_body_matrix(coefficients.vehicle)[0]
         wake = coefficients.get("w_T")
         self._wake = int(places[wake.term.name, wake.part][0]) if wake else None
 
-    def model(self, values: Array) -> kernel.Model:
+    def model(self, values: Array) -> Model:
         """The kernel's model at (rows,) values, in the order of the rows of the coefficients."""
         # einsum and not BLAS: the sum does not depend on how many threads BLAS may use.
         added = np.einsum("k,kij->ij", values[self._added], self._units)
         total = self._rigid + added
-        return self._base._replace(
-            data=(self._data @ values).reshape(-1, kernel.WIDTH),
+        return self._base.replaced(
+            data=(self._data @ values).reshape(-1, layout.WIDTH),
             mass_matrix=total,
             added_mass=added,
             inverse_mass=np.linalg.inv(total),

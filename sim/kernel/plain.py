@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 
 from sim.boat.catalogue import BOAT_FEATURES
 from sim.boat.forces import boat_features
-from sim.kernel import rhs as kernel
-from sim.kernel.assemble import cross_matrix
+from sim.boat.mass import cross_matrix
+from sim.kernel import layout
+from sim.kernel.layout import Model
 
 Array = NDArray[np.float64]
 
@@ -23,16 +24,16 @@ def _weights(nodes: Array, rule: int, x: float) -> tuple[int, Array]:
     i = int(np.clip(np.searchsorted(nodes, x, side="right") - 1, 0, nodes.size - 2))
     a, b = nodes[i], nodes[i + 1]
     outward = a * b > 0.0 and x * a > 0.0 and abs(x) > max(abs(a), abs(b))
-    if rule == kernel.LINEAR_LOAD and outward:
+    if rule == layout.LINEAR_LOAD and outward:
         t = (1.0 / x - 1.0 / a) / (1.0 / b - 1.0 / a)
     else:
         t = (x - a) / (b - a)
-        t = t if rule == kernel.LINEAR else min(max(t, 0.0), 1.0)
+        t = t if rule == layout.LINEAR else min(max(t, 0.0), 1.0)
     return i, np.array([1.0 - t, t])
 
 
-def features(m: kernel.Model, y: Array, c: Array) -> Array:
-    """Feature vector as ``kernel.fill_features`` fills it, the constant 1 last."""
+def features(m: Model, y: Array, c: Array) -> Array:
+    """Feature vector as ``sim.kernel.rhs.features`` fills it, the constant 1 last."""
     n_planes = len(m.planes)
     n = float(c[n_planes])
     advance = (1.0 - m.wake) * y[0] / (n * m.diameter) if n else 0.0
@@ -44,25 +45,24 @@ def features(m: kernel.Model, y: Array, c: Array) -> Array:
     return np.concatenate([[boat[k] for k in BOAT_FEATURES], plane.reshape(-1), [1.0]])
 
 
-def loads(m: kernel.Model, f: Array) -> Array:
+def loads(m: Model, f: Array) -> Array:
     """Hydrodynamic loads X Y Z K M N [N, N m] from a feature vector."""
-    total = np.zeros(kernel.N_OUT)
-    for first_link, links, first, count, start in m.groups:
-        weight, place = np.ones(1), np.array([start])
-        for axis, stride in m.links[first_link : first_link + links]:
+    total = np.zeros(layout.N_OUT)
+    products = np.prod(f[m.multipliers], axis=1)
+    for axes, strides, first, multipliers in m.groups:
+        weight, place = np.ones(1), np.array([first])
+        for axis, stride in zip(axes, strides, strict=True):
             feature, rule, node, nodes = m.axes[axis]
             i, w = _weights(m.nodes[node : node + nodes], rule, f[feature])
             weight = np.multiply.outer(weight, w).reshape(-1)
             place = np.add.outer(place, np.array([i, i + 1]) * stride).reshape(-1)
-        values = weight @ m.data[place, :count]
-        terms = m.terms[first : first + count]
-        np.add.at(total, terms[:, 0], m.scale[first : first + count] * values * np.prod(f[terms[:, 1:]], axis=1))
-    total[0] += (1.0 - total[kernel.OUT_DEDUCTION]) * total[kernel.OUT_THRUST]
+        total += (weight @ m.data[place]) * products[list(multipliers)]
+    total[0] += (1.0 - total[layout.OUT_DEDUCTION]) * total[layout.OUT_THRUST]
     return total[:6]
 
 
-def rhs(m: kernel.Model, y: Array, c: Array) -> Array:
-    """Time derivative of the state; arguments as ``kernel.rhs``."""
+def rhs(m: Model, y: Array, c: Array) -> Array:
+    """Time derivative of the state; arguments as ``sim.kernel.rhs.rhs``."""
     v, omega = y[:3], y[3:6]
     (sf, st, sp), (cf, ct, cp) = np.sin(y[9:12]), np.cos(y[9:12])
     rotation = np.array(
@@ -74,10 +74,10 @@ def rhs(m: kernel.Model, y: Array, c: Array) -> Array:
     )
     ixx, iyy, izz, ixy, ixz, iyz = m.inertia
     inertia = np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]])
-    r_g, r_b, down = np.array(m.r_g), np.array(m.r_b), rotation[2]
+    r_g, r_b, down = m.r_g, m.r_b, rotation[2]
     mass, weight, inverse = m.mass, m.weight, m.inverse_mass
-    if m.tank:
-        ballast, shift, tank = c[-2], c[-1], np.array(m.tank)
+    if m.has_tanks:
+        ballast, shift, tank = c[-2], c[-1], m.tank
         moment = m.mass * np.array([shift, 0.0, 0.0]) + ballast * tank
         lever = cross_matrix(tank)
         inertia = inertia - ballast * lever @ lever

@@ -20,7 +20,7 @@ from sim.waves.linear import Waves
 
 if TYPE_CHECKING:
     from sim.boat.coefficients import Coefficients
-    from sim.kernel.assemble import Environment
+    from sim.boat.mass import Environment
     from sim.waves.mean_loads import DipoleBody
 
 Array = NDArray[np.float64]

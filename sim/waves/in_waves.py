@@ -22,9 +22,8 @@ from sim.waves.surroundings import Surroundings
 
 if TYPE_CHECKING:
     from sim.boat.coefficients import Coefficients
+    from sim.boat.mass import Environment
     from sim.boat.vehicle import Vehicle
-    from sim.kernel.assemble import Environment
-    from sim.kernel.rhs import Model
 
 Array = NDArray[np.float64]
 
@@ -227,13 +226,13 @@ def shares(added: Array, centres: Array, masses: Array) -> Array:
     return parts
 
 
-def surroundings(water: Water, model: Model) -> Surroundings:
+def surroundings(water: Water, added_mass: Array) -> Surroundings:
     """The water around one boat and thread, with scratch arrays of its own.
 
     Parameters
     ----------
     water : Shared.
-    model : The boat, with the added mass of the left-hand side.
+    added_mass : (6, 6) of the left-hand side.
     """
     sums, count = passage(water.sea), len(water.centres)
     volume = np.bincount(water.cells.section, weights=water.cells.volumes, minlength=count).astype(float)
@@ -248,8 +247,8 @@ def surroundings(water: Water, model: Model) -> Surroundings:
         box=water.sea.box,
         crest=water.sea.crest,
         drift=water.drift,
-        added=np.ascontiguousarray(model.added_mass),
-        parts=shares(model.added_mass, water.centres, water.masses),
+        added=np.ascontiguousarray(added_mass),
+        parts=shares(added_mass, water.centres, water.masses),
         volume=volume,
         specific_weight=water.specific_weight,
         clock=np.array([0.0, 0.0, -1.0]),

@@ -26,12 +26,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.kernel.assemble import added_mass_matrix, cross_matrix, rigid_body_matrix
+from sim.boat.mass import added_mass_matrix, cross_matrix, rigid_body_matrix
 from sim.waves.in_waves import section_masses, volume_points
 
 if TYPE_CHECKING:
     from sim.boat.coefficients import Coefficients
-    from sim.kernel.assemble import Environment
+    from sim.boat.mass import Environment
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]

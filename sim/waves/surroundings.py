@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from sim.hull.emergence import Cells, lost_buoyancy
 from sim.waves import passage as wave_passage
 from sim.waves.drift import Drift, add_mean
-from sim.waves.loads import FORCE, WATER, Passage, Sea
+from sim.waves.loads import FORCE, PROBES, WATER, Passage, Sea
 from sim.waves.passage import WATER_RATE
 from sim.waves.pressure import box_top
 
@@ -146,6 +146,24 @@ def observe(around: Around, y: Array) -> None:
             around.felt[i] -= around.found[WATER + i]
 
 
+def relative(around: Around, y: Array) -> Array:
+    """State ``y`` with velocities relative to the water, after ``observe``."""
+    return np.asarray(around.felt)
+
+
+def plane_inflow(around: Around, plane: int) -> tuple[float, float, float]:
+    """Velocity of the water at a plane, body axes [m/s], after ``observe``."""
+    if not around.waves:
+        return 0.0, 0.0, 0.0
+    k = PROBES + 3 * plane
+    return around.found[k], around.found[k + 1], around.found[k + 2]
+
+
+def propeller_inflow(around: Around, planes: int) -> float:
+    """Velocity of the water ahead at the propeller [m/s], after ``observe``."""
+    return float(around.found[PROBES + 3 * planes]) if around.waves else 0.0
+
+
 def read_gauge(around: Around, state: Array, rate: Array) -> None:
     """Change depth and its rate to what the boat's depth gauge reads in the pressure of the waves.
 
@@ -179,6 +197,41 @@ def _calm_observe(around: Around, y: Array) -> None:
 
 def _calm_read_gauge(around: Around, state: Array, rate: Array) -> None:
     pass
+
+
+def _calm_relative(around: Around, y: Array) -> Array:
+    return y
+
+
+def _calm_plane_inflow(around: Around, plane: int) -> tuple[float, float, float]:
+    return 0.0, 0.0, 0.0
+
+
+def _calm_propeller_inflow(around: Around, planes: int) -> float:
+    return 0.0
+
+
+def _felt(around: Around, y: Array) -> Array:
+    return around.felt
+
+
+def _wave_propeller_inflow(around: Around, planes: int) -> float:
+    return around.found[PROBES + 3 * planes] if around.waves else 0.0
+
+
+@overload(relative)
+def _choose_relative(around: Around, y: Array) -> object:
+    return _felt if len(around) else _calm_relative
+
+
+@overload(plane_inflow)
+def _choose_plane_inflow(around: Around, plane: int) -> object:
+    return plane_inflow if len(around) else _calm_plane_inflow
+
+
+@overload(propeller_inflow)
+def _choose_propeller_inflow(around: Around, planes: int) -> object:
+    return _wave_propeller_inflow if len(around) else _calm_propeller_inflow
 
 
 @overload(read_gauge)
