@@ -1,26 +1,177 @@
-"""How the simulator's functions are compiled."""
+"""How the simulator's functions are compiled, and kept from one start to the next."""
 
 from __future__ import annotations
 
+import contextlib
+import sys
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any, TypeVar, cast
 
 from numba import njit
+from numba.core.caching import CompileResultCacheImpl, FunctionCache, IndexDataCacheFile
+
+from sim.compiled_cache import cache_place, is_ours
 
 F = TypeVar("F", bound=Callable[..., Any])
 
-_OPTIONS: dict[str, Any] = {"cache": True, "error_model": "numpy", "nogil": True}
+_OPTIONS: dict[str, Any] = {"error_model": "numpy", "nogil": True}
 _INSIDE: dict[str, Any] = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+_PACKAGE = Path(__file__).resolve().parent
+# Time to compile the right-hand side and the loop around it [s], said beforehand.
+_CALM, _WAVES = 10, 20
+
+
+class _Locator:
+    """Tells numba where a function is kept: by module and line, wherever the file lies."""
+
+    def __init__(self, function: Callable[..., Any], place: Path) -> None:
+        self._py_file = function.__code__.co_filename
+        self._name = f"{function.__module__}-{function.__code__.co_firstlineno}"
+        self._place = place
+
+    def ensure_cache_path(self) -> None:
+        """Nothing to do: the folder was made when it was chosen."""
+
+    def get_cache_path(self) -> str:
+        """Folder of this state of the sources."""
+        return str(self._place)
+
+    def get_source_stamp(self) -> str:
+        """The name of the folder: a digest of all sources."""
+        return self._place.name
+
+    def get_disambiguator(self) -> str:
+        """Module and line."""
+        return self._name
+
+    @classmethod
+    def from_function(cls, function: Callable[..., Any], file: str) -> _Locator | None:
+        """A locator, or None where nothing can be kept."""
+        place = cache_place(_PACKAGE)
+        return None if place is None else cls(function, place)
+
+
+class _Result(CompileResultCacheImpl):
+    _locator_classes = [_Locator]  # noqa: RUF012
+
+
+class _Files(IndexDataCacheFile):
+    """Index and data of a function; what another could have written is not read."""
+
+    def _load_index(self) -> dict[Any, str]:
+        return dict(super()._load_index()) if is_ours(Path(self._index_path)) else {}
+
+    def _load_data(self, name: str) -> Any:
+        if not is_ours(Path(self._data_path(name))):
+            raise OSError(f"{name} is not the user's own")
+        return super()._load_data(name)
+
+
+class _Cache(FunctionCache):
+    """Compiled functions of one Python function, on disk."""
+
+    _impl_class = _Result
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        super().__init__(function)
+        self._cache_file = _Files(self._cache_path, self._impl.filename_base, self._impl.locator.get_source_stamp())
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """A kept function; a damaged file is thrown away, and compiled again."""
+        try:
+            found = super().load_overload(sig, target_context)
+        except Exception:
+            # Truncated, foreign or unreadable: whatever a damaged pickle raises.
+            self._throw_away()
+            found = None
+        if found is None:
+            _announce(self._py_func, sig, "once per installation")
+        return found
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        """Keep a function; without room for it nothing is kept."""
+        try:
+            super().save_overload(sig, data)
+        except OSError:
+            self.disable()
+        except Exception:
+            # A damaged index.
+            self._throw_away()
+            with contextlib.suppress(OSError):
+                super().save_overload(sig, data)
+
+    def _throw_away(self) -> None:
+        for path in Path(self._cache_path).glob(f"{self._impl.filename_base}.*"):
+            with contextlib.suppress(OSError):
+                path.unlink()
+
+
+class _NoCache:
+    """Says that nothing is kept; otherwise as numba's own."""
+
+    cache_path = None
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        self._function = function
+
+    def load_overload(self, sig: Any, target_context: Any) -> None:
+        _announce(self._function, sig, "at every start, as no folder of your own can keep it")
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        pass
+
+    def enable(self) -> None:
+        pass
+
+    def disable(self) -> None:
+        pass
+
+    def flush(self) -> None:
+        pass
+
+
+def _kept(function: F, **options: Any) -> F:
+    compiled = njit(**_OPTIONS, **options)(function)
+    compiled._cache = _LazyCache(function)
+    return cast(F, compiled)
+
+
+class _LazyCache:
+    """The cache of a function once it is asked for: an import reads no sources."""
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        self._function = function
+        self._made: Any = None
+
+    def __getattr__(self, name: str) -> Any:
+        if self._made is None:
+            self._made = _Cache(self._function) if cache_place(_PACKAGE) else _NoCache(self._function)
+        return getattr(self._made, name)
+
+
+_LOOPS = {"run": "a flight", "hold": "a flight", "fill_rate": "the right-hand side", "step": "the right-hand side"}
+_said: set[str] = set()
+
+
+def _announce(function: Callable[..., Any], sig: Any, how_often: str) -> None:
+    """Say on stderr what takes so long, once a process for each of calm water and waves."""
+    waves = "Surroundings" in str(sig)
+    where = "in waves" if waves else "in calm water"
+    if function.__name__ in _LOOPS and where not in _said:
+        _said.add(where)
+        seconds = _WAVES if waves else _CALM
+        print(f"compiling the right-hand side {where}, {how_often}, about {seconds} s", file=sys.stderr, flush=True)
 
 
 def outer(function: F) -> F:
     """Compile what is called from Python, and by other compiled functions."""
-    return cast(F, njit(**_OPTIONS)(function))
+    return _kept(function)
 
 
 def inner(function: F) -> F:
     """Compile what other compiled functions call only: without a door to Python a third less work."""
-    return cast(F, njit(**_OPTIONS, **_INSIDE)(function))
+    return _kept(function, **_INSIDE)
 
 
 def inlined(function: F) -> F:
@@ -28,4 +179,9 @@ def inlined(function: F) -> F:
 
     A call with seven arrays takes 50 ns, a tenth of a right-hand side.
     """
-    return cast(F, njit(**_OPTIONS, **_INSIDE, forceinline=True)(function))
+    return _kept(function, **_INSIDE, forceinline=True)
+
+
+def fast(liberties: set[str]) -> Callable[[F], F]:
+    """As ``inner``, with the liberties that the compiler may take with the order of sums."""
+    return lambda function: _kept(function, **_INSIDE, fastmath=liberties)

@@ -1,10 +1,12 @@
-"""Where compiled functions are cached: one folder for each state of the sources.
+"""Where compiled functions are kept: one folder for each state of the sources.
 
-numba compares a cached function with the file it stands in only; code inlined from another
-file, and constants taken from one, could change unseen. A folder named by a digest of all of
-these files makes every edit, and every upgrade, compile afresh.
+numba compares a cached function with the file it stands in only, by its path; code inlined from
+another file, and constants taken from one, could change unseen, and a copy of the package
+elsewhere would compile again. A folder named by a digest of all of these files makes every edit,
+and every upgrade, compile afresh, and serves every copy of the same sources.
 
-Imported by ``sim`` itself, before numba: nothing heavy belongs here.
+What lies there is run. It is believed only when it belongs to the user and nobody else could have
+written it. Nothing heavy is imported here.
 """
 
 from __future__ import annotations
@@ -12,9 +14,10 @@ from __future__ import annotations
 import hashlib
 import os
 import re
-import sys
+import stat
 import time
 from collections.abc import Iterator
+from functools import lru_cache
 from pathlib import Path
 
 VARIABLE = "NUMBA_CACHE_DIR"
@@ -24,10 +27,11 @@ PREFIX = "ident-compiled-"
 _KEPT = 5
 _RECENT = 86400.0
 _IMPORTS = re.compile(r"^(?:from|import) sim((?:\.\w+)+)(?: import \(?([\w\s,]+))?", re.MULTILINE)
+_MARKS = ("cache=True", "from sim.compiled import")
 
 
 def compiled_sources(folder: Path) -> list[Path]:
-    """Modules with cached compiled functions, and what those import from the package.
+    """Modules with compiled functions that are kept, and what those import from the package.
 
     Parameters
     ----------
@@ -42,8 +46,7 @@ def compiled_sources(folder: Path) -> list[Path]:
         ".".join(path.relative_to(folder).with_suffix("").parts): path.read_text(encoding="utf-8")
         for path in folder.rglob("*.py")
     }
-    marks = ("cache=True", "from sim.compiled import")
-    todo = [n for n, source in text.items() if any(m in source for m in marks) and not n.startswith("bench.")]
+    todo = [n for n, source in text.items() if any(m in source for m in _MARKS) and not n.startswith("bench.")]
     found: set[str] = set()
     while todo:
         name = todo.pop()
@@ -64,37 +67,45 @@ def sources_key(folder: Path) -> str:
     return digest.hexdigest()[:16]
 
 
+def is_ours(path: Path) -> bool:
+    """Whether a file or folder is the user's own, no link, and nobody else may write it.
+
+    Where a system has no such owners, everything is.
+    """
+    if not hasattr(os, "geteuid"):
+        return True
+    try:
+        found = os.lstat(path)
+    except OSError:
+        return False
+    kind = stat.S_ISDIR(found.st_mode) or stat.S_ISREG(found.st_mode)
+    return kind and found.st_uid == os.geteuid() and not found.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
+
+
 def _candidates(folder: Path) -> Iterator[Path]:
-    """Parents for the cache, best first: the user's cache folder, then the package's own."""
+    """Parents for the cache, best first: where the user wants it, the user's cache folder, the package's own."""
+    chosen = os.environ.get(VARIABLE, "")
+    if chosen:
+        yield Path(chosen)
+        return
     given = os.environ.get("LOCALAPPDATA" if os.name == "nt" else "XDG_CACHE_HOME", "")
     base = Path(given) if os.path.isabs(given) else Path(os.path.expanduser("~")) / ".cache"
     if base.is_absolute():
         yield base / "ident-submarine"
-    yield folder / "__pycache__"
+    yield folder / "__pycache__" / "ident-submarine"
 
 
 def _opened(place: Path) -> bool:
-    """Make a folder and mark it as used now; False where that is not allowed."""
+    """Make a folder for the user alone and mark it as used now; False where that cannot be."""
     try:
-        place.mkdir(mode=0o700, parents=True, exist_ok=True)
+        place.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+        place.mkdir(mode=0o700, exist_ok=True)
+        if not is_ours(place) or not is_ours(place.parent):
+            return False
         (place / "used").write_bytes(b"")
     except OSError:
         return False
     return True
-
-
-def _temporary() -> str:
-    """A folder for this process alone, or nothing when there is no place for it either."""
-    import atexit
-    import shutil
-    import tempfile
-
-    try:
-        place = tempfile.mkdtemp(prefix=PREFIX)
-    except OSError:
-        return ""
-    atexit.register(shutil.rmtree, place, ignore_errors=True)
-    return place
 
 
 def remove_stale(parent: Path) -> None:
@@ -114,29 +125,21 @@ def remove_stale(parent: Path) -> None:
             shutil.rmtree(place, ignore_errors=True)
 
 
-def use_keyed_cache(folder: Path | None = None) -> None:
-    """Point numba at the folder of this state of the sources.
-
-    A place that the user chose stays. One inherited from a parent process that ran this package
-    is chosen again: the sources may have changed since. Where no lasting folder can be written,
-    one for this process is used: numba's own choice would not see the change of another file.
+@lru_cache(maxsize=8)
+def cache_place(folder: Path) -> Path | None:
+    """The folder of this state of the sources, made when it is not there.
 
     Parameters
     ----------
-    folder : Path, optional
-        Of the package ``sim``; this file's by default.
+    folder : Of the package ``sim``.
+
+    Returns
+    -------
+    None where no folder can be written, or none is the user's alone: nothing is kept then.
     """
-    config = sys.modules.get("numba.core.config")
-    chosen = (os.environ.get(VARIABLE, ""), getattr(config, "CACHE_DIR", ""))
-    if any(place and not Path(place).name.startswith(PREFIX) for place in chosen):
-        return
-    folder = folder or Path(__file__).resolve().parent
     name = PREFIX + sources_key(folder)
     parent = next((parent for parent in _candidates(folder) if _opened(parent / name)), None)
-    if parent is not None:
-        remove_stale(parent)
-    place = str(parent / name) if parent is not None else _temporary()
-    os.environ[VARIABLE] = place
-    if config is not None:
-        # numba reads the environment when it is imported; this process has done that already.
-        config.CACHE_DIR = place  # type: ignore[attr-defined]
+    if parent is None:
+        return None
+    remove_stale(parent)
+    return parent / name

@@ -31,14 +31,15 @@ from sim.waves.in_waves import surroundings, volume_points, water_around
 from sim.waves.linear import regular
 from sim.waves.pressure import froude_krylov, reference_load
 from sim.waves.spectra import Spectrum, realise, sea_state
-from sim.waves.surroundings import prepare
+from sim.waves.surroundings import near_of, prepare
 
 
 @njit(cache=True)
 def _steps(m, w, states, controls, rate, step, around, s, k, stage, out):
+    near = near_of(around)
     for i in range(states.shape[0]):
         prepare(around, states[i], i * step)
-        kernel.step(m, w, states[i], controls[i], rate, step, around, s, k, stage, out)
+        kernel.step(m, w, states[i], controls[i], rate, step, near, s, k, stage, out)
 
 
 @njit(cache=True)

@@ -41,7 +41,7 @@ from sim.flight.orders import (
 )
 from sim.kernel.layout import N_STATES, Around, Model, Stage, workspace
 from sim.kernel.rhs import fill_rate, step
-from sim.waves.surroundings import prepare, read_gauge
+from sim.waves.surroundings import near_of, prepare, read_gauge
 
 Array = NDArray[np.float64]
 
@@ -86,7 +86,7 @@ def _cross(
     rate: np.ndarray,
     t: float,
     h: float,
-    around: Around,
+    near: Around,
     s: np.ndarray,
     k: np.ndarray,
     stage: Stage,
@@ -97,7 +97,7 @@ def _cross(
     while True:
         close = high - low <= _EVENT_TOLERANCE
         middle = high if close else 0.5 * (low + high)
-        step(m, w, y, c, rate, middle, around, s, k, stage, trial)
+        step(m, w, y, c, rate, middle, near, s, k, stage, trial)
         if close:
             return high
         if _past(g, q, f, j, trial, t + middle) >= 0.0:
@@ -194,7 +194,7 @@ def run(
     executes and steps than their arrays have room for.
     """
     dy, trial, read, change = np.empty(N_STATES), np.empty(N_STATES), np.empty(N_STATES), np.empty(N_STATES)
-    rate = np.empty(c.size)
+    rate, near = np.empty(c.size), near_of(around)
     rows, events, logged, ends = 0, 0, 0, False
     programmed = q[N_EVENTS] > 0
     zigzag = q[LAW] == ZIGZAG or q[LAW + 1] == ZIGZAG
@@ -204,7 +204,7 @@ def run(
     for sample in range(steps + 1):
         now = start + sample * dt
         prepare(around, y, now)
-        fill_rate(m, w, y, c, around, s, k, dy)
+        fill_rate(m, w, y, c, near, s, k, dy)
         if programmed:
             watch(g, q, f, j, y, dy, now)
         for i in range(N_STATES):
@@ -221,10 +221,10 @@ def run(
         left = dt
         while left > 0.0:
             now, part = start + sample * dt + (dt - left), left
-            step(m, w, y, c, rate, left, around, s, k, stage, trial)
+            step(m, w, y, c, rate, left, near, s, k, stage, trial)
             happens = (zigzag or programmed) and _past(g, q, f, j, trial, now + left) >= 0.0
             if happens:
-                part = _cross(m, w, g, q, f, j, y, c, rate, now, left, around, s, k, stage, trial)
+                part = _cross(m, w, g, q, f, j, y, c, rate, now, left, near, s, k, stage, trial)
             for i in range(N_STATES):
                 y[i] = trial[i]
             for i in range(c.size):
@@ -246,6 +246,46 @@ def run(
             move_actuators(g, q, f, c, max(left, _EVENT_TOLERANCE), rate)
             prepare(around, y, now)
     return rows, events, logged, start + steps * dt
+
+
+@outer
+def hold(
+    m: np.ndarray,
+    w: np.ndarray,
+    g: np.ndarray,
+    q: np.ndarray,
+    f: np.ndarray,
+    y: np.ndarray,
+    c: np.ndarray,
+    dt: float,
+    steps: int,
+    around: Around,
+    s: np.ndarray,
+    k: np.ndarray,
+    stage: Stage,
+    rate: np.ndarray,
+    start: float,
+) -> float:
+    """Samples with the commands in ``f`` held: ``run`` without autopilot, events and record.
+
+    Parameters
+    ----------
+    rate : (controls,) scratch. Others as ``run``.
+
+    Returns
+    -------
+    Time at the end [s]; not a number when the state left the finite numbers.
+    """
+    near = near_of(around)
+    for sample in range(steps):
+        prepare(around, y, start + sample * dt)
+        move_actuators(g, q, f, c, dt, rate)
+        step(m, w, y, c, rate, dt, near, s, k, stage, y)
+        for i in range(c.size):
+            c[i] += dt * rate[i]
+        if not _is_finite(y):
+            return np.nan
+    return start + steps * dt
 
 
 class Flown(NamedTuple):

@@ -84,6 +84,7 @@ class Plant:
         self._start, self._moved, self.trim = initial_state(case, self.vehicle, model)
         self._model = weight_across(model, self.trim.lateral) if self.trim and self.trim.lateral else model
         self._settings = settings_of(self._case, self.vehicle, self._start, self._moved, self.trim)
+        self._orders = orders.flat(self._settings)
         self._columns = columns_of(self.vehicle, uses_tanks(case))[1:-2]
         self.reset()
 
@@ -114,6 +115,9 @@ class Plant:
         planes = len(self.vehicle.planes)
         level = (self.trim.dV, self.trim.dH) if self.trim else (0.0, 0.0)
         self.commands = dict(zip(COMMANDS, (*level, *self.controls[planes:].tolist()), strict=False))
+        self._progress, self._rate = orders.progress(self._settings, self.state), np.zeros(self.controls.size)
+        for name in self.commands:
+            self._give(name)
         around = surroundings(self._water, self._model.added_mass) if self._water else ()
         self._work = workspace(self._model, around)
 
@@ -155,31 +159,30 @@ class Plant:
             raise InputError("plant, steps", f"{steps}", "one control sample or more")
         for name, value in commands.items():
             self._check(name, value)
-        self.commands |= {name: float(value) for name, value in commands.items()}
-        settings = self._commanded()
-        record, executes, log = np.zeros((1, 15 + self.controls.size)), np.zeros((1, 2)), np.zeros((1, 3))
-        work = self._work
-        self.time = maneuver.run(
-            self._model.real,
-            self._model.whole,
-            *orders.flat(settings),
-            *orders.progress(settings, self.state),
+        for name, value in commands.items():
+            self.commands[name] = float(value)
+            self._give(name)
+        work, model = self._work, self._model
+        end = maneuver.hold(
+            model.real,
+            model.whole,
+            self._orders[0],
+            self._orders[1],
+            self._progress.f,
             self.state,
             self.controls,
             self.dt,
-            steps,
             steps,
             work.around,
             work.real,
             work.whole,
             work.stage,
-            record,
-            executes,
-            log,
+            self._rate,
             self.time,
-        )[3]
-        if not np.isfinite(self.state).all():
+        )
+        if end != end:
             raise FloatingPointError(f"the state left the finite numbers after {self.time:.3f} s")
+        self.time = end
         return self.state.copy()
 
     def _check(self, name: str, value: float) -> None:
@@ -192,13 +195,10 @@ class Plant:
         if name in ("dV", "dH") and abs(value) > math.pi:
             raise InputError(f"plant, command {name}", f"{value:g}", "radians, between -pi and pi")
 
-    def _commanded(self) -> orders.Settings:
-        """The loop's settings with the present commands as fixed ones."""
-        given, limit = self.commands, self._settings.n_limit
-        tanks = [given.get(name, 0.0) for name in TANKS]
-        return self._settings._replace(
-            value=np.array([given["dV"], given["dH"]]),
-            revolutions=float(np.clip(given["n"], limit[0], limit[1])),
-            tank_law=np.zeros(2, dtype=self._settings.tank_law.dtype),
-            tank_start=np.array(tanks),
-        )
+    def _give(self, name: str) -> None:
+        """Hand a command on to the loop; revolutions stay within their limits."""
+        value = self.commands[name]
+        if name == "n":
+            low, high = self._settings.n_limit
+            value = min(max(value, low), high)
+        self._progress.f[orders.COMMAND + COMMANDS.index(name)] = value

@@ -6,10 +6,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import root
 
-from sim.kernel import rhs as kernel
+from sim.flight.balance import DV, SCRATCH, balance, place
 from sim.kernel.layout import Model, workspace
+from sim.kernel.rhs import fill_rate
 
 Array = NDArray[np.float64]
 
@@ -55,6 +55,9 @@ _LEVEL = {"planes": ("pitch", "dV"), "ballast": ("dV", "ballast"), "tanks": ("ba
 # What takes over when a tank is at its limit.
 _NEXT = {"trim_tank": "dV", "ballast": "pitch"}
 TANK_NAMES = ("ballast", "trim_tank")
+_NAMES = ("pitch", "dV", *TANK_NAMES)
+# Largest acceleration that counts as none [m/s^2, rad/s^2].
+_BALANCED = 1e-8
 
 
 def _solve(
@@ -72,51 +75,40 @@ def _solve(
     -------
     The state found and, if it is no equilibrium, what is wrong with it.
     """
-    work, derivative = workspace(model), np.zeros(12)
-    # n relative to U/D: an advance coefficient near one. Tanks by what balances 1 % of weight.
-    reference = speed / model.diameter
-    size = {"pitch": 1.0, "dV": 1.0, "ballast": 0.01 * model.mass, "trim_tank": 1.0}
-    x_g, y_g, z_g = model.r_g
-
-    def build(x: Array) -> tuple[Array, Array, dict[str, float]]:
-        n, first, second, heel, drift, dh = x
-        if upright:
-            heel = 0.0
-        level = values | {k: float(size[k] * v) for k, v in zip(free, (first, second), strict=True)}
-        pitch = level["pitch"]
-        u = speed * np.cos(drift) * np.cos(pitch)
-        v = speed * np.sin(drift)
-        # Level flight: -sin(theta) u + sin(phi) cos(theta) v + cos(phi) cos(theta) w = 0.
-        w = (np.sin(pitch) * u - np.sin(heel) * np.cos(pitch) * v) / (np.cos(heel) * np.cos(pitch))
-        scale = speed / np.sqrt(u * u + v * v + w * w)
-        state = np.zeros(12)
-        state[:3] = u * scale, v * scale, w * scale
-        state[8], state[9], state[10] = depth - model.sail_top, heel, pitch
-        tanks = [level[k] for k in TANK_NAMES] if model.has_tanks else []
-        return state, np.array([*(mixer @ np.array([level["dV"], dh])), n * reference, *tanks]), level
-
-    def weighted(x: Array) -> Model:
-        # Where nothing accelerates, the weight's place matters and the mass matrix does not.
-        return model.replaced(r_g=(x_g, y_g + float(x[3]), z_g)) if upright else model
+    work, m, w = workspace(model), model.real, model.whole
+    planes, tanks = mixer.shape[0], len(TANK_NAMES) if model.has_tanks else 0
+    state, derivative, controls = np.zeros(12), np.zeros(12), np.zeros(planes + 1 + tanks)
+    # Ballast by what balances 1 % of the weight.
+    size = np.array([1.0, 1.0, 0.01 * model.mass, 1.0])
+    level = np.array([values[k] for k in _NAMES])
+    unknown = np.array([_NAMES.index(k) for k in free])
+    z = depth - model.sail_top
+    boat = (speed, z, np.ascontiguousarray(mixer), unknown, level, size, upright)
 
     def residual(x: Array) -> Array:
-        state, controls, _ = build(x)
-        kernel.rhs(weighted(x), state, controls, work, derivative)
+        place(m, w, x, *boat, work.real, state, controls)
+        fill_rate(m, w, state, controls, (), work.real, work.whole, derivative)
         return derivative[:6].copy()
 
-    found = root(residual, np.array([1.2, 0.0, 0.0, 0.0, 0.0, 0.0]), method="hybr", tol=1e-13)
-    state, controls, level = build(found.x)
-    left = float(np.abs(residual(found.x)).max())
+    # n relative to U/D: an advance coefficient near one.
+    start = np.array([1.2, 0.0, 0.0, 0.0, 0.0, 0.0])
+    x = start.copy()
+    left = balance(m, w, x, *boat, (), work.real, work.whole, state, controls, derivative, np.zeros(SCRATCH))
+    if not left <= _BALANCED:
+        # Newton's method gives up at kinks of the tables that a trust region may pass.
+        from scipy.optimize import root
+
+        x = root(residual, start, method="hybr", tol=1e-13).x
+    left = float(np.abs(residual(x)).max())
     wrong = ""
-    if not np.isfinite(left) or left > 1e-8:
+    if not left <= _BALANCED:
         wrong = (
             f"no self-propulsion state at {speed:.4g} m/s and D0 = {depth:.4g} m; {_closest(state, controls, mixer)}"
         )
     # The path is straight: heading such that the course is along earth x.
-    kernel.rhs(weighted(found.x), state, controls, work, derivative)
     state[11] = -np.arctan2(derivative[7], derivative[6])
-    lateral = float(found.x[3]) if upright else 0.0
-    return Trim(state, controls, level["dV"], float(found.x[5]), left, lateral=lateral), wrong
+    lateral = float(x[3]) if upright else 0.0
+    return Trim(state, controls, float(level[DV]), float(x[5]), left, lateral=lateral), wrong
 
 
 def _closest(state: Array, controls: Array, mixer: Array) -> str:

@@ -9,19 +9,21 @@ under: calm, submerged runs keep every digit.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import cos, sin
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from sim.compiled import inner, outer
 from sim.hull.mesh import Mesh
-from sim.waves.pressure import box_top, fill_rotation
 
 Array = NDArray[np.float64]
 _SIDES = (1.0, -1.0)
 # Cells below this share of a mean one are dropped.
 _DUST = 1e-6
+# Numbers of a cell: box, half extents, volume, centroid.
+CELL = 10
 
 
 class Cells(NamedTuple):
@@ -136,7 +138,75 @@ def cells(
     )
 
 
-@njit(cache=True, error_model="numpy")
+def flat_cells(c: Cells) -> tuple[Array, NDArray[np.int64]]:
+    """Cells as the compiled loop reads them, one after the other.
+
+    Returns
+    -------
+    Box, half extents, volume and centroid; station and section.
+    """
+    floats = np.column_stack([c.boxes, c.halves, c.volumes, c.points])
+    return floats.ravel(), np.column_stack([c.station, c.section]).astype(np.int64).ravel()
+
+
+@inner
+def lose(
+    a: Array,
+    at: int,
+    count: int,
+    b: NDArray[np.int64],
+    places: int,
+    y: Array,
+    surface: int,
+    specific_weight: float,
+    out: int,
+    dry: int,
+    sections: int,
+) -> float:
+    """``lost_buoyancy`` with everything in one array ``a``: cells, elevations and results.
+
+    Parameters
+    ----------
+    at, count : First of the cells in ``a``, and how many. places : Of their stations in ``b``.
+    surface, out, dry : Where elevations, load and emerged volumes stand in ``a``.
+
+    Returns
+    -------
+    Emerged volume [m^3].
+    """
+    for i in range(6):
+        a[out + i] = 0.0
+    for i in range(sections):
+        a[dry + i] = 0.0
+    st, ct = sin(y[10]), cos(y[10])
+    down0, down1, down2 = -st, sin(y[9]) * ct, cos(y[9]) * ct
+    total, mx, my, mz = 0.0, 0.0, 0.0, 0.0
+    for i in range(count):
+        k = at + CELL * i
+        depth = y[8] + down0 * a[k] + down1 * a[k + 1] + down2 * a[k + 2] + a[surface + b[places + 2 * i]]
+        half = abs(down0) * a[k + 3] + abs(down1) * a[k + 4] + abs(down2) * a[k + 5]
+        if depth < half:
+            share = a[k + 6] * min(1.0, 0.5 * (half - depth) / half)
+            total += share
+            a[dry + b[places + 2 * i + 1]] += share
+            mx += share * a[k + 7]
+            my += share * a[k + 8]
+            mz += share * a[k + 9]
+    # Lost lift: a weight of water, downward in body axes, at the dry centroid.
+    fx, fy, fz = specific_weight * down0, specific_weight * down1, specific_weight * down2
+    a[out], a[out + 1], a[out + 2] = total * fx, total * fy, total * fz
+    a[out + 3], a[out + 4], a[out + 5] = my * fz - mz * fy, mz * fx - mx * fz, mx * fy - my * fx
+    return total
+
+
+@outer
+def _lost(
+    a: Array, b: NDArray[np.int64], y: Array, specific_weight: float, stations: int, cells: int, sections: int
+) -> float:
+    at = 6 + sections + stations
+    return lose(a, at, cells, b, 0, y, 6 + sections, specific_weight, 0, 6, sections)
+
+
 def lost_buoyancy(c: Cells, y: Array, surface: Array, specific_weight: float, out: Array, dry: Array) -> float:
     """Load to add to the fully submerged one where the boat is out of the water.
 
@@ -152,31 +222,8 @@ def lost_buoyancy(c: Cells, y: Array, surface: Array, specific_weight: float, ou
     -------
     Emerged share of the volume, 0 (and ``out`` and ``dry`` zero) when submerged.
     """
-    for i in range(6):
-        out[i] = 0.0
-    for i in range(dry.size):
-        dry[i] = 0.0
-    lowest = 0.0
-    for i in range(surface.size):
-        lowest = min(lowest, surface[i])
-    m = np.empty((3, 3))
-    fill_rotation(y[9], y[10], y[11], m)
-    a, b, d = m[2, 0], m[2, 1], m[2, 2]
-    if y[8] + box_top(c.low, c.high, a, b, d) + lowest > 0.0:
-        return 0.0
-    total, mx, my, mz = 0.0, 0.0, 0.0, 0.0
-    for i in range(c.volumes.size):
-        depth = y[8] + a * c.boxes[i, 0] + b * c.boxes[i, 1] + d * c.boxes[i, 2] + surface[c.station[i]]
-        half = abs(a) * c.halves[i, 0] + abs(b) * c.halves[i, 1] + abs(d) * c.halves[i, 2]
-        if depth < half:
-            share = c.volumes[i] * min(1.0, 0.5 * (half - depth) / half)
-            total += share
-            dry[c.section[i]] += share
-            mx += share * c.points[i, 0]
-            my += share * c.points[i, 1]
-            mz += share * c.points[i, 2]
-    # Lost lift: a weight of water, downward along (a, b, d) in body axes, at the dry centroid.
-    fx, fy, fz = specific_weight * a, specific_weight * b, specific_weight * d
-    out[0], out[1], out[2] = total * fx, total * fy, total * fz
-    out[3], out[4], out[5] = my * fz - mz * fy, mz * fx - mx * fz, mx * fy - my * fx
-    return total / c.volumes.sum()
+    floats, places = flat_cells(c)
+    a = np.concatenate([np.zeros(6 + dry.size), surface, floats])
+    total = _lost(a, places, y, specific_weight, surface.size, c.volumes.size, dry.size)
+    out[:], dry[:] = a[:6], a[6 : 6 + dry.size]
+    return total / float(sum(c.volumes))

@@ -9,7 +9,6 @@ from __future__ import annotations
 from math import cos, sin
 
 import numpy as np
-from numba.extending import overload
 
 from sim.compiled import inlined, inner
 from sim.kernel.layout import (
@@ -24,6 +23,7 @@ from sim.kernel.layout import (
     WEIGHT,
     Around,
 )
+from sim.waves.surroundings import is_emerged, wet_change
 
 Loads = tuple[float, float, float, float, float, float]
 
@@ -92,47 +92,13 @@ def _solve(s: np.ndarray, dy: np.ndarray) -> None:
         dy[k] = left / s[SYSTEM + 8 * k]
 
 
-def _changes(around: Around) -> bool:
-    """Whether the surroundings change the mass matrix now: the hull is partly out of the water."""
-    raise NotImplementedError
-
-
-def _add_dry_part(around: Around, s: np.ndarray) -> None:
-    """Take the added mass of what is out of the water from the mass matrix in the scratch."""
-
-
-@overload(_changes)
-def _choose_changes(around: Around) -> object:
-    def calm(around: Around) -> bool:
-        return False
-
-    def surfacing(around: Around) -> bool:
-        return around.emerged[0] > 0.0
-
-    return surfacing if len(around) else calm
-
-
-@overload(_add_dry_part)
-def _choose_dry_part(around: Around, s: np.ndarray) -> object:
-    def calm(around: Around, s: np.ndarray) -> None:
-        pass
-
-    def surfacing(around: Around, s: np.ndarray) -> None:
-        if around.emerged[0] > 0.0:
-            for i in range(6):
-                for j in range(6):
-                    s[SYSTEM + 7 * i + j] += around.wet[i, j] - around.added[i, j]
-
-    return surfacing if len(around) else calm
-
-
 @inlined
 def accelerate(
-    m: np.ndarray, w: np.ndarray, c: np.ndarray, loads: Loads, around: Around, s: np.ndarray, dy: np.ndarray
+    m: np.ndarray, w: np.ndarray, c: np.ndarray, loads: Loads, near: Around, s: np.ndarray, dy: np.ndarray
 ) -> None:
     """Accelerations of six loads, into ``dy``; by elimination only where the matrix changes."""
     f0, f1, f2, f3, f4, f5 = loads
-    if not (w[HAS_TANKS] or _changes(around)):
+    if not (w[HAS_TANKS] or is_emerged(near)):
         for i in range(6):
             k = INVERSE_MASS + 6 * i
             dy[i] = m[k] * f0 + m[k + 1] * f1 + m[k + 2] * f2 + m[k + 3] * f3 + m[k + 4] * f4 + m[k + 5] * f5
@@ -144,5 +110,8 @@ def accelerate(
         s[SYSTEM + 7 * i + 6] = dy[i]
     if w[HAS_TANKS]:
         _fill_tanks(m, c[w[N_PLANES] + 1], c[w[N_PLANES] + 2], s)
-    _add_dry_part(around, s)
+    if is_emerged(near):
+        for i in range(6):
+            for j in range(6):
+                s[SYSTEM + 7 * i + j] += wet_change(near, i, j)
     _solve(s, dy)

@@ -60,8 +60,9 @@ AXIS, CELL = 5, 5
 # Factors of a multiplier.
 MAX_FACTORS = 4
 
-# Scratch, floats: eight outputs, a linear system, then the features.
-LOADS, SYSTEM, FEATURES = 0, 8, 56
+# Scratch, floats: eight outputs, a linear system, the shift of the weight to starboard [m], then the
+# features.
+LOADS, SYSTEM, SHIFT, FEATURES = 0, 8, 50, 56
 N_BOAT, N_PLANE = len(BOAT_FEATURES), len(PLANE_FEATURES)
 FIRST_PLANE = FEATURES + N_BOAT
 

@@ -3,7 +3,7 @@
 Everything here runs without Python objects, on the arrays of ``sim.kernel.layout``. ``rhs`` and
 ``rk4`` take a ``Model`` and a ``Work``; ``fill_rate`` and ``step`` are what compiled loops call.
 Waves and a surface in reach are ``sim.waves.surroundings``; the compiler chooses by the type of
-``around``, so that a boat in deep, calm water is compiled without them.
+``near``, so that a boat in deep, calm water is compiled without them.
 """
 
 from __future__ import annotations
@@ -32,6 +32,7 @@ from sim.kernel.layout import (
     R_B,
     R_G,
     SAIL_TOP,
+    SHIFT,
     WAKE,
     WEIGHT,
     Around,
@@ -41,7 +42,7 @@ from sim.kernel.layout import (
     Z,
 )
 from sim.kernel.tables import add_up_loads
-from sim.waves.surroundings import add_loads, observe, plane_inflow, propeller_inflow, relative, tick
+from sim.waves.surroundings import add_loads, near_of, observe, plane_inflow, propeller_inflow, relative, tick
 
 # Places of the features of the catalogue in the scratch.
 _AT = {name: FEATURES + i for i, name in enumerate(BOAT_FEATURES)}
@@ -63,24 +64,24 @@ def _arcsine(x: float) -> float:
 
 
 @inlined
-def _fill_boat(m: np.ndarray, y: np.ndarray, ahead: float, n: float, s: np.ndarray) -> None:
+def _fill_boat(m: np.ndarray, y: np.ndarray, at: int, ahead: float, n: float, s: np.ndarray) -> None:
     """Features of the boat as a whole, in the order of the catalogue, into the scratch.
 
     Parameters
     ----------
-    y : (12,) state, velocities through the water. ahead : u at the propeller [m/s]. n : [1/s].
+    y : State from ``at`` on, velocities through the water. ahead : u at the propeller [m/s]. n : [1/s].
     """
-    u, v, w_, p, q, r = y[0], y[1], y[2], y[3], y[4], y[5]
+    u, v, w_, p, q, r = y[at], y[at + 1], y[at + 2], y[at + 3], y[at + 4], y[at + 5]
     for i in range(6):
-        s[FEATURES + i] = y[i]
-        s[_SIZES + i] = abs(y[i])
+        s[FEATURES + i] = y[at + i]
+        s[_SIZES + i] = abs(y[at + i])
     cross2 = v * v + w_ * w_
     speed = sqrt(u * u + cross2)
     s[_SPEED], s[_CROSS] = speed, sqrt(cross2)
     s[_SIGN_V], s[_SIGN_W] = _sign(v), _sign(w_)
     s[_ALPHA] = atan2(w_, u) if speed > 0.0 else 0.0
     s[_BETA] = _arcsine(v / speed) if speed > 0.0 else 0.0
-    s[_DEPTH] = y[Z] + m[SAIL_TOP]
+    s[_DEPTH] = y[at + Z] + m[SAIL_TOP]
     s[_N], s[_SIZE_N] = n, abs(n)
     s[_ADVANCE] = (1.0 - m[WAKE]) * ahead / (n * m[DIAMETER]) if n != 0.0 else 0.0
     s[_U_BY], s[_U_BY + 1], s[_U_BY + 2] = u * p, u * q, u * r
@@ -91,13 +92,13 @@ def _fill_boat(m: np.ndarray, y: np.ndarray, ahead: float, n: float, s: np.ndarr
 
 
 @inlined
-def _fill_planes(m: np.ndarray, w: np.ndarray, y: np.ndarray, c: np.ndarray, around: Around, s: np.ndarray) -> None:
+def _fill_planes(m: np.ndarray, w: np.ndarray, y: np.ndarray, c: np.ndarray, near: Around, s: np.ndarray) -> None:
     """Speed, effective angle and deflection of every plane from its velocity through the water."""
     u, v, w_, p, q, r = y[0], y[1], y[2], y[3], y[4], y[5]
     at, k = PLANES, FIRST_PLANE
     for i in range(w[N_PLANES]):
         x, yy, z = m[at], m[at + 1], m[at + 2]
-        flow = plane_inflow(around, i)
+        flow = plane_inflow(near, i)
         a, b, d = u + q * z - r * yy - flow[0], v + r * x - p * z - flow[1], w_ + p * yy - q * x - flow[2]
         size = sqrt(a * a + b * b + d * d)
         incidence = 0.0
@@ -109,9 +110,11 @@ def _fill_planes(m: np.ndarray, w: np.ndarray, y: np.ndarray, c: np.ndarray, aro
 
 
 @inlined
-def _features(m: np.ndarray, w: np.ndarray, y: np.ndarray, c: np.ndarray, around: Around, s: np.ndarray) -> None:
-    _fill_boat(m, relative(around, y), y[0] - propeller_inflow(around, w[N_PLANES]), c[w[N_PLANES]], s)
-    _fill_planes(m, w, y, c, around, s)
+def _features(m: np.ndarray, w: np.ndarray, y: np.ndarray, c: np.ndarray, near: Around, s: np.ndarray) -> None:
+    through, at = relative(near, y)
+    planes = w[N_PLANES]
+    _fill_boat(m, through, at, y[0] - propeller_inflow(near, planes), c[planes], s)
+    _fill_planes(m, w, y, c, near, s)
 
 
 @inlined
@@ -120,24 +123,24 @@ def _rate(
     w: np.ndarray,
     y: np.ndarray,
     c: np.ndarray,
-    around: Around,
+    near: Around,
     s: np.ndarray,
     k: np.ndarray,
     dy: np.ndarray,
 ) -> None:
     """Time derivative of the state, Eqs. (12)-(16) as corrected, added mass on the left."""
-    observe(around, y)
-    _features(m, w, y, c, around, s)
+    observe(near, y)
+    _features(m, w, y, c, near, s)
     add_up_loads(m, w, s, k)
     if w[HAS_TANKS]:
         add_tank_loads(m, w, y, c, s)
-    add_loads(around, y, s)
+    add_loads(near, y, s)
     u, v, w_, p, q, r = y[0], y[1], y[2], y[3], y[4], y[5]
     phi, theta, psi = y[9], y[10], y[11]
     sf, cf, st, ct, sp, cp = sin(phi), cos(phi), sin(theta), cos(theta), sin(psi), cos(psi)
     gx, gy, gz = -st, ct * sf, ct * cf
     mass, weight, buoyancy = m[MASS], m[WEIGHT], m[BUOYANCY]
-    xg, yg, zg = m[R_G], m[R_G + 1], m[R_G + 2]
+    xg, yg, zg = m[R_G], m[R_G + 1] + s[SHIFT], m[R_G + 2]
     xb, yb, zb = m[R_B], m[R_B + 1], m[R_B + 2]
     net = weight - buoyancy
     mx, my, mz = xg * weight - xb * buoyancy, yg * weight - yb * buoyancy, zg * weight - zb * buoyancy
@@ -154,7 +157,7 @@ def _rate(
     f3 = s[LOADS + 3] + my * gz - mz * gy - (q * hz - r * hy) - mass * (yg * cz - zg * cy)
     f4 = s[LOADS + 4] + mz * gx - mx * gz - (r * hx - p * hz) - mass * (zg * cx - xg * cz)
     f5 = s[LOADS + 5] + mx * gy - my * gx - (p * hy - q * hx) - mass * (xg * cy - yg * cx)
-    accelerate(m, w, c, (f0, f1, f2, f3, f4, f5), around, s, dy)
+    accelerate(m, w, c, (f0, f1, f2, f3, f4, f5), near, s, dy)
     dy[6] = ct * cp * u + (sf * st * cp - cf * sp) * v + (cf * st * cp + sf * sp) * w_
     dy[7] = ct * sp * u + (sf * st * sp + cf * cp) * v + (cf * st * sp - sf * cp) * w_
     dy[8] = -st * u + sf * ct * v + cf * ct * w_
@@ -169,7 +172,7 @@ def fill_rate(
     w: np.ndarray,
     y: np.ndarray,
     c: np.ndarray,
-    around: Around,
+    near: Around,
     s: np.ndarray,
     k: np.ndarray,
     dy: np.ndarray,
@@ -180,17 +183,17 @@ def fill_rate(
     ----------
     m, w : Model, floats and whole numbers.
     y, c : State and controls.
-    around : Surroundings, at the time of their clock.
+    near : What is around, at the time of its clock.
     s, k : Scratch, floats and whole numbers.
     dy : (12,) result.
     """
-    _rate(m, w, y, c, around, s, k, dy)
+    _rate(m, w, y, c, near, s, k, dy)
 
 
 @outer
-def fill_features(m: np.ndarray, w: np.ndarray, y: np.ndarray, c: np.ndarray, around: Around, s: np.ndarray) -> None:
+def fill_features(m: np.ndarray, w: np.ndarray, y: np.ndarray, c: np.ndarray, near: Around, s: np.ndarray) -> None:
     """Features of a state in what is around it, into the scratch; with waves after ``observe``."""
-    _features(m, w, y, c, around, s)
+    _features(m, w, y, c, near, s)
 
 
 @outer
@@ -207,7 +210,7 @@ def step(
     c: np.ndarray,
     rate: np.ndarray,
     h: float,
-    around: Around,
+    near: Around,
     s: np.ndarray,
     k: np.ndarray,
     stage: Stage,
@@ -225,8 +228,8 @@ def step(
             moved[i] = c[i] + ahead * rate[i]
         for i in range(N_STATES):
             z[i] = y[i] + ahead * dy[i] if part else y[i]
-        tick(around, ahead)
-        _rate(m, w, z, moved, around, s, k, dy)
+        tick(near, ahead)
+        _rate(m, w, z, moved, near, s, k, dy)
         twice = 2.0 if part == 1 or part == 2 else 1.0
         for i in range(N_STATES):
             total[i] = total[i] + twice * dy[i] if part else dy[i]
@@ -258,7 +261,7 @@ def rhs(model: Model, y: np.ndarray, c: np.ndarray, work: Work, dy: np.ndarray) 
     work : Scratch of the model.
     dy : (12,) result.
     """
-    fill_rate(model.real, model.whole, y, c, work.around, work.real, work.whole, dy)
+    fill_rate(model.real, model.whole, y, c, near_of(work.around), work.real, work.whole, dy)
 
 
 def rk4(model: Model, y: np.ndarray, c: np.ndarray, rate: np.ndarray, h: float, work: Work, out: np.ndarray) -> None:
@@ -270,4 +273,4 @@ def rk4(model: Model, y: np.ndarray, c: np.ndarray, rate: np.ndarray, h: float, 
     c, rate : Controls at the start and their rates.
     h : Step [s].
     """
-    step(model.real, model.whole, y, c, rate, h, work.around, work.real, work.whole, work.stage, out)
+    step(model.real, model.whole, y, c, rate, h, near_of(work.around), work.real, work.whole, work.stage, out)

@@ -13,9 +13,9 @@ from math import cos, exp, floor, sin
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from sim.compiled import inner, outer
 from sim.waves.linear import Waves
 
 if TYPE_CHECKING:
@@ -140,7 +140,57 @@ def tabulate(body: DipoleBody, waves: Waves, least: float, top_speed: float = 0.
     return Drift(np.ascontiguousarray(loads.transpose(0, 3, 1, 2)), float(decay), least, step)
 
 
-@njit(cache=True, error_model="numpy")
+@inner
+def mean_load(
+    a: Array, at: int, speeds: int, headings: int, depths: int, decay: float, least: float, speed_step: float, y: Array
+) -> tuple[float, float, float, float, float, float]:
+    """Mean second-order load X Y Z K M N at a state, from a table that starts at ``a[at]``.
+
+    Parameters
+    ----------
+    speeds, headings, depths : Of the table. decay, least, speed_step : As ``Drift``.
+    """
+    depth = max(y[8], least)
+    size, near = exp(-decay * depth), least / depth * (depths - 1)
+    d = min(int(near), depths - 2)
+    near -= d
+    turn = y[11] / TWO_PI
+    turn = (turn - floor(turn)) * headings
+    h = min(int(turn), headings - 1)
+    turn -= h
+    after = h + 1 if h + 1 < headings else 0
+    fast = min(max(y[0] / speed_step, 0.0), speeds - 1.0)
+    s = min(int(fast), max(speeds - 2, 0))
+    fast -= s
+    x = z = yy = k = m = n = 0.0
+    for corner in range(8 if speeds > 1 else 4):
+        share = size * (near if corner & 1 else 1.0 - near) * (turn if corner & 2 else 1.0 - turn)
+        share *= fast if corner & 4 else 1.0 - fast
+        i = at + 6 * (((s + (corner >> 2)) * headings + (after if corner & 2 else h)) * depths + d + (corner & 1))
+        x += share * a[i]
+        yy += share * a[i + 1]
+        z += share * a[i + 2]
+        k += share * a[i + 3]
+        m += share * a[i + 4]
+        n += share * a[i + 5]
+    st, ct, sf, cf = sin(y[10]), cos(y[10]), sin(y[9]), cos(y[9])
+    return (
+        ct * x - st * z,
+        sf * (st * x + ct * z) + cf * yy,
+        cf * (st * x + ct * z) - sf * yy,
+        ct * k - st * n,
+        sf * (st * k + ct * n) + cf * m,
+        cf * (st * k + ct * n) - sf * m,
+    )
+
+
+@outer
+def _mean(
+    a: Array, speeds: int, headings: int, depths: int, decay: float, least: float, speed_step: float, y: Array
+) -> tuple[float, float, float, float, float, float]:
+    return mean_load(a, 0, speeds, headings, depths, decay, least, speed_step, y)
+
+
 def add_mean(drift: Drift, y: Array, out: Array) -> None:
     """Add the mean second-order loads at a state; without waves nothing is done.
 
@@ -150,36 +200,7 @@ def add_mean(drift: Drift, y: Array, out: Array) -> None:
     y : (12,) state; speed ahead, depth and attitude are used.
     out : (6,) or longer; X Y Z K M N about the body origin, body axes, are added [N, N m].
     """
-    loads = drift.loads
-    if loads.shape[0] == 0:
-        return
-    depth = max(y[8], drift.least)
-    size, near = exp(-drift.decay * depth), drift.least / depth * (loads.shape[2] - 1)
-    d = min(int(near), loads.shape[2] - 2)
-    near -= d
-    turn = y[11] / TWO_PI
-    turn = (turn - floor(turn)) * loads.shape[1]
-    h = min(int(turn), loads.shape[1] - 1)
-    turn -= h
-    after = h + 1 if h + 1 < loads.shape[1] else 0
-    fast = min(max(y[0] / drift.speed_step, 0.0), loads.shape[0] - 1.0)
-    s = min(int(fast), max(loads.shape[0] - 2, 0))
-    fast -= s
-    x = z = yy = k = m = n = 0.0
-    for corner in range(8 if loads.shape[0] > 1 else 4):
-        share = size * (near if corner & 1 else 1.0 - near) * (turn if corner & 2 else 1.0 - turn)
-        share *= fast if corner & 4 else 1.0 - fast
-        a, b, c = s + (corner >> 2), after if corner & 2 else h, d + (corner & 1)
-        x += share * loads[a, b, c, 0]
-        yy += share * loads[a, b, c, 1]
-        z += share * loads[a, b, c, 2]
-        k += share * loads[a, b, c, 3]
-        m += share * loads[a, b, c, 4]
-        n += share * loads[a, b, c, 5]
-    st, ct, sf, cf = sin(y[10]), cos(y[10]), sin(y[9]), cos(y[9])
-    out[0] += ct * x - st * z
-    out[1] += sf * (st * x + ct * z) + cf * yy
-    out[2] += cf * (st * x + ct * z) - sf * yy
-    out[3] += ct * k - st * n
-    out[4] += sf * (st * k + ct * n) + cf * m
-    out[5] += cf * (st * k + ct * n) - sf * m
+    if drift.loads.shape[0]:
+        speeds, headings, depths = drift.loads.shape[:3]
+        found = _mean(drift.loads.ravel(), speeds, headings, depths, drift.decay, drift.least, drift.speed_step, y)
+        out[:6] += found

@@ -16,9 +16,9 @@ from sim.hull.emergence import Cells, cells
 from sim.hull.surface import read_geometry
 from sim.waves.drift import Drift, make_drift
 from sim.waves.linear import Waves, calm
-from sim.waves.loads import Sea, make_sea, passage, section_added_mass
+from sim.waves.loads import Sea, make_sea, section_added_mass
 from sim.waves.pressure import Quadrature, quadrature
-from sim.waves.surroundings import Surroundings
+from sim.waves.surroundings import Surroundings, surroundings_of
 
 if TYPE_CHECKING:
     from sim.boat.coefficients import Coefficients
@@ -234,29 +234,5 @@ def surroundings(water: Water, added_mass: Array) -> Surroundings:
     water : Shared.
     added_mass : (6, 6) of the left-hand side.
     """
-    sums, count = passage(water.sea), len(water.centres)
-    volume = np.bincount(water.cells.section, weights=water.cells.volumes, minlength=count).astype(float)
-    return Surroundings(
-        sea=water.sea,
-        sums=sums,
-        waves=water.sea.waves.amplitude.size > 0,
-        time=sums.time,
-        value=sums.value,
-        slope=sums.slope,
-        cells=water.cells,
-        box=water.sea.box,
-        crest=water.sea.crest,
-        drift=water.drift,
-        added=np.ascontiguousarray(added_mass),
-        parts=shares(added_mass, water.centres, water.masses),
-        volume=volume,
-        specific_weight=water.specific_weight,
-        clock=np.array([0.0, 0.0, -1.0]),
-        found=np.zeros(sums.value.shape[1]),
-        felt=np.zeros(12),
-        lost=np.zeros(6),
-        mean=np.zeros(6),
-        dry=np.zeros(count),
-        wet=np.zeros((6, 6)),
-        emerged=np.zeros(1),
-    )
+    added, parts = np.ascontiguousarray(added_mass), shares(added_mass, water.centres, water.masses)
+    return surroundings_of(water.sea, water.cells, water.drift, added, parts, water.specific_weight)

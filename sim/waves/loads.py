@@ -27,9 +27,9 @@ from math import exp, floor, sqrt
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from sim.compiled import inlined, inner, outer
 from sim.waves.linear import Waves
 from sim.waves.pressure import Quadrature, box_top, fill_rotation
 from sim.waves.sums import sum_few, sum_many
@@ -193,7 +193,7 @@ def passage(sea: Sea) -> Passage:
     )
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def _place(sea: Sea, y: Array, time: float, pas: Passage) -> None:
     """Points and their velocities from the shallowest one, in earth axes; phases and sizes there."""
     m, w = pas.matrix, sea.waves
@@ -229,7 +229,7 @@ def _place(sea: Sea, y: Array, time: float, pas: Passage) -> None:
             pas.single_phase[kind, j] = pas.phase[kind, j]
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@inlined
 def _to_body(sums: Array, m: Array, y: Array, body: Array) -> None:
     """Earth vector and rate to body axes; the rate is that of the body-axis components."""
     for k in range(3):
@@ -240,7 +240,7 @@ def _to_body(sums: Array, m: Array, y: Array, body: Array) -> None:
     body[5] -= y[3] * body[1] - y[4] * body[0]
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def _add(points: Array, i: int, fx: float, fy: float, fz: float, out: Array, at: int) -> None:
     """Add a vector acting at a point and its moment about the origin."""
     x, y, z = points[i, 0], points[i, 1], points[i, 2]
@@ -252,14 +252,14 @@ def _add(points: Array, i: int, fx: float, fy: float, fz: float, out: Array, at:
     out[at + 5] += x * fy - y * fx
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def _near(sea: Sea, y: Array, matrix: Array) -> bool:
     """Whether a crest can reach the boat before the next sums; ``matrix`` turns body to earth."""
     rise = sea.span * sqrt(y[0] * y[0] + y[1] * y[1] + y[2] * y[2])
-    return y[8] + box_top(sea.box[0], sea.box[1], matrix[2, 0], matrix[2, 1], matrix[2, 2]) - rise <= sea.crest
+    return y[8] + box_top(sea.box.reshape(6), 0, matrix[2, 0], matrix[2, 1], matrix[2, 2]) - rise <= sea.crest
 
 
-@njit(cache=True, error_model="numpy")
+@outer
 def evaluate(sea: Sea, y: Array, time: float, pas: Passage, value: Array, slope: Array) -> None:
     """Every wave quantity at a state, exactly, with its rate along the present motion.
 

@@ -9,9 +9,9 @@ from __future__ import annotations
 from math import sqrt
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from sim.compiled import inlined, inner, outer
 from sim.waves.loads import IMPULSE, WATER, Passage, Sea, evaluate
 from sim.waves.pressure import fill_rotation
 
@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 WATER_RATE = IMPULSE
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def _predict(y: Array, h: float, gain: Array, matrix: Array, out: Array) -> None:
     """State after h when the velocities change by ``gain``, second order in h."""
     mean = np.empty(6)
@@ -42,7 +42,7 @@ def _predict(y: Array, h: float, gain: Array, matrix: Array, out: Array) -> None
     out[9], out[10], out[11] = y[9] + h * dphi, y[10] + h * dtheta, y[11] + h * turn
 
 
-@njit(cache=True, error_model="numpy")
+@inner
 def _miss(sea: Sea, y: Array, pas: Passage) -> float:
     """Largest distance of a point from where it was predicted [m], and of its velocity over a span."""
     size = 0.0
@@ -56,7 +56,7 @@ def _miss(sea: Sea, y: Array, pas: Passage) -> float:
     return miss
 
 
-@njit(cache=True, error_model="numpy")
+@outer
 def advance(sea: Sea, y: Array, time: float, pas: Passage) -> None:
     """Make the sums cover the time from now on; call it before a step, not within one.
 
@@ -85,19 +85,54 @@ def advance(sea: Sea, y: Array, time: float, pas: Passage) -> None:
     evaluate(sea, pas.state, pas.time[1], pas, pas.value[1], pas.slope[1])
 
 
-@njit(cache=True, error_model="numpy", inline="always")
-def _hermite(span: Array, time: float) -> tuple[float, float, float, float, float, float, float]:
+@inlined
+def _hermite(start: float, end: float, time: float) -> tuple[float, float, float, float, float, float, float]:
     """Weights of a cubic between two sums: of the values and slopes at its ends, in the value
     (four) and in its rate (of the difference of the values, and of the slopes)."""
-    h = span[1] - span[0]
-    t = (time - span[0]) / h
+    h = end - start
+    t = (time - start) / h
     a, b = (1.0 + 2.0 * t) * (1.0 - t) * (1.0 - t), t * t * (3.0 - 2.0 * t)
     c, d = h * t * (1.0 - t) * (1.0 - t), h * t * t * (t - 1.0)
     e, f, g = 6.0 * t * (1.0 - t) / h, (1.0 - t) * (1.0 - 3.0 * t), t * (3.0 * t - 2.0)
     return a, b, c, d, e, f, g
 
 
-@njit(cache=True, error_model="numpy")
+@inlined
+def blend(
+    v: Array,
+    start: float,
+    end: float,
+    value: int,
+    slope: int,
+    width: int,
+    time: float,
+    first: int,
+    last: int,
+    out: Array,
+    at: int,
+) -> None:
+    """Wave quantities ``first`` to ``last`` at a time, into ``out`` from ``at + first`` on.
+
+    Parameters
+    ----------
+    v : Holds values and slopes at both ends of the span, ``width`` each, from ``value`` and ``slope`` on.
+    start, end, time : Of the span, and wanted [s].
+    """
+    a, b, c, d, e, f, g = _hermite(start, end, time)
+    after, turned = value + width, slope + width
+    for i in range(first, last):
+        out[at + i] = a * v[value + i] + b * v[after + i] + c * v[slope + i] + d * v[turned + i]
+    if first == 0:
+        for i in range(WATER, WATER + 6):
+            rate = e * (v[after + i] - v[value + i]) + f * v[slope + i] + g * v[turned + i]
+            out[at + WATER_RATE - WATER + i] = rate
+
+
+@outer
+def _interpolate(start: float, end: float, v: Array, width: int, time: float, out: Array) -> None:
+    blend(v, start, end, 0, 2 * width, width, time, 0, width, out, 0)
+
+
 def interpolate(span: Array, value: Array, slope: Array, time: float, out: Array) -> None:
     """Wave quantities at a time inside the present span, by cubic Hermite interpolation.
 
@@ -109,15 +144,11 @@ def interpolate(span: Array, value: Array, slope: Array, time: float, out: Array
         along the motion [m/s^2, rad/s^2], which times the added mass is the added-mass load;
         WATER; PROBES; gauge; elevations.
     """
-    a, b, c, d, e, f, g = _hermite(span, time)
-    for i in range(out.size):
-        out[i] = a * value[0, i] + b * value[1, i] + c * slope[0, i] + d * slope[1, i]
-    for i in range(6):
-        k = WATER + i
-        out[WATER_RATE + i] = e * (value[1, k] - value[0, k]) + f * slope[0, k] + g * slope[1, k]
+    v = np.concatenate([value.ravel(), slope.ravel()])
+    _interpolate(span[0], span[1], v, value.shape[1], time, out)
 
 
-@njit(cache=True, error_model="numpy")
+@outer
 def gauge(sea: Sea, pas: Passage, time: float) -> tuple[float, float]:
     """Head of the waves' pressure at the body origin and its rate along the motion.
 
@@ -132,5 +163,5 @@ def gauge(sea: Sea, pas: Passage, time: float) -> tuple[float, float]:
     """
     i = pas.value.shape[1] - sea.stations - 1
     p, q, r, s = pas.value[0, i], pas.value[1, i], pas.slope[0, i], pas.slope[1, i]
-    a, b, c, d, e, f, g = _hermite(pas.time, time)
+    a, b, c, d, e, f, g = _hermite(pas.time[0], pas.time[1], time)
     return a * p + b * q + c * r + d * s, e * (q - p) + f * r + g * s

@@ -18,9 +18,9 @@ from math import cos, exp, sin
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from sim.compiled import outer
 from sim.hull.mesh import Mesh
 from sim.waves.linear import Waves, kinematics
 
@@ -47,7 +47,7 @@ def rotation(phi: float, theta: float, psi: float) -> Array:
     return matrix
 
 
-@njit(cache=True, error_model="numpy")
+@outer
 def fill_rotation(phi: float, theta: float, psi: float, out: Array) -> None:
     """``rotation`` into a (3, 3) array."""
     sf, cf, st, ct, sp, cp = sin(phi), cos(phi), sin(theta), cos(theta), sin(psi), cos(psi)
@@ -56,17 +56,17 @@ def fill_rotation(phi: float, theta: float, psi: float, out: Array) -> None:
     out[2, 0], out[2, 1], out[2, 2] = -st, sf * ct, cf * ct
 
 
-@njit(cache=True, error_model="numpy")
-def box_top(low: Array, high: Array, a: float, b: float, d: float) -> float:
+@outer
+def box_top(box: Array, at: int, a: float, b: float, d: float) -> float:
     """Depth of the highest corner of a body-axis box below the body origin [m]; negative above.
 
     Parameters
     ----------
-    low, high : (3,) corners of the box [m].
+    box : Holds the low and the high corner of the box [m] from ``at`` on.
     a, b, d : Downward direction in body axes: last row of ``rotation``.
     """
-    along = min(a * low[0], a * high[0])
-    return along + min(b * low[1], b * high[1]) + min(d * low[2], d * high[2])
+    along = min(a * box[at], a * box[at + 3])
+    return along + min(b * box[at + 1], b * box[at + 4]) + min(d * box[at + 2], d * box[at + 5])
 
 
 def surface_load(mesh: Mesh, pressure: Callable[[Array], Array]) -> Array:
@@ -207,7 +207,7 @@ def _part_points(part: Mesh, number: float, tolerance: float) -> tuple[Array, Ar
     return np.concatenate(points), np.concatenate(volumes)
 
 
-@njit(cache=True, error_model="numpy")
+@outer
 def froude_krylov(w: Waves, q: Quadrature, y: Array, time: float, out: Array) -> None:
     """Froude-Krylov load by the quadrature; zero, and nothing else done, without components.
 

@@ -9,9 +9,9 @@ from __future__ import annotations
 from math import cos, exp, sin
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from sim.compiled import fast, inlined
 from sim.waves.linear import Waves
 
 Array = NDArray[np.float64]
@@ -31,7 +31,7 @@ _E2, _E3, _E4, _E5, _E6 = _E
 _SIXTY_FOURTH, _NOTHING = np.float32(1 / 64), np.float32(-20.0)
 
 
-@njit(cache=True, error_model="numpy", fastmath=_FAST)
+@fast(_FAST)
 def sum_many(
     single: Single, sizes: Single, phases: Single, kind: int, place: Array, motion: Array, i: int, out: Array
 ) -> None:
@@ -71,7 +71,7 @@ def sum_many(
     out[0], out[1], out[2], out[3], out[4], out[5] = a0, a1, a2, b0, b1, b2
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@inlined
 def sum_few(w: Waves, size: Array, phase: Array, kind: int, place: Array, motion: Array, i: int, out: Array) -> None:
     """Sum over the components of size e^{-kz} (n cos, e cos, -sin)(theta) and its rate along a motion."""
     x, y, z = place[i, 0], place[i, 1], place[i, 2]

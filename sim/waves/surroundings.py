@@ -7,6 +7,9 @@ Where the hull is out of the water it loses buoyancy (``sim.hull.emergence``), i
 Froude-Krylov and mean loads, and the added mass of its emerged sections, on both sides of the
 equation of motion. Left out: the momentum of the added mass that changes (slamming), and the
 tables, which know the submerged boat only.
+
+What the right-hand side needs stands in one array of floats and one of whole numbers, ``near``:
+handing over the sums over the waves as well would take longer than using them.
 """
 
 from __future__ import annotations
@@ -15,153 +18,139 @@ from math import cos, sin
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
-from numba import njit
 from numba.extending import overload
 from numpy.typing import NDArray
 
-from sim.hull.emergence import Cells, lost_buoyancy
+from sim.compiled import inner
+from sim.hull.emergence import Cells, flat_cells, lose
 from sim.waves import passage as wave_passage
-from sim.waves.drift import Drift, add_mean
-from sim.waves.loads import FORCE, PROBES, WATER, Passage, Sea
-from sim.waves.passage import WATER_RATE
+from sim.waves.drift import Drift, mean_load
+from sim.waves.loads import FORCE, PROBES, WATER, Passage, Sea, passage
+from sim.waves.passage import WATER_RATE, blend
 from sim.waves.pressure import box_top
 
 Array = NDArray[np.float64]
+Whole = NDArray[np.int64]
+
+# Floats: time at the start of the step, now, and of the quantities found [s], negative when that is
+# not known; the span of the sums [s]; highest elevation that can come [m]; rho g [N/m^3]; volume
+# [m^3] and its emerged share; decay, least depth and speed step of the mean loads; box around the boat
+# and around its cells, corners [m]; state with velocities relative to the water; load of emergence; added
+# mass of the left-hand side and of the wet part. Then the quantities found, and more by ``AT``.
+START, NOW, FOUND_AT, SPAN_START, SPAN_END, CREST, SPECIFIC_WEIGHT, VOLUME, EMERGED = range(9)
+DECAY, LEAST, SPEED_STEP = 9, 10, 11
+BOX, CELL_BOX, FELT, LOST, ADDED, WET, FOUND = 12, 18, 24, 36, 42, 78, 114
+# Whole numbers: whether there are waves and mean loads; how many quantities, those of them that are always
+# wanted, stations, cells and sections; speeds, headings and depths of the mean loads; where the rest stands.
+WAVES, DRIFT, WIDTH, WANTED, N_STATIONS, N_CELLS, N_SECTIONS = range(7)
+SPEEDS, HEADINGS, DEPTHS = 7, 8, 9
+AT_VALUE, AT_SLOPE, AT_CELLS, AT_DRIFT, AT_PARTS, AT_SECTIONS, AT_DRY = range(10, 17)
+PLACES = 17
+
+
+class Near(NamedTuple):
+    """What the right-hand side needs of the surroundings: floats and whole numbers."""
+
+    a: Array
+    b: Whole
 
 
 class Surroundings(NamedTuple):
     """Of one boat and thread.
 
     sea, sums : Waves and the boat's points in them; a sea without components is calm.
-    waves : Whether it has any. time, value, slope : Of ``sums``, at hand: every access to a
-        tuple of many arrays costs what it holds.
-    cells : Of the hull, for emergence. box : (2, 3) corners of a box around it [m]. crest :
-        Highest elevation that can come [m].
-    drift : Mean second-order loads of the waves.
-    added : (6, 6) added mass of the left-hand side. parts : (k + 1, 6, 6) what each section
-        has of it, then the rest. volume : (k,) volume of the cells of each section [m^3].
-    specific_weight : rho g [N/m^3].
-    clock : (3,) time at the start of the step, now, and of ``found`` [s]; the last negative
-        when that is not known.
-    found : (n,) wave quantities now, in the layout of ``sim.waves.passage.interpolate``.
-    felt : (12,) state with velocities relative to the water. lost : (6,) load of emergence
-        [N, N m]. dry : (k,) emerged volume by section [m^3]. wet : (6, 6) added mass of the wet
-        part. mean : (6,) second-order loads [N, N m]. emerged : (1,) emerged share of the volume.
+    near : What the right-hand side needs.
     """
 
+    near: Near
     sea: Sea
     sums: Passage
-    waves: bool
-    time: Array
-    value: Array
-    slope: Array
-    cells: Cells
-    box: Array
-    crest: float
-    drift: Drift
-    added: Array
-    parts: Array
-    volume: Array
-    specific_weight: float
-    clock: Array
-    found: Array
-    felt: Array
-    lost: Array
-    dry: Array
-    wet: Array
-    mean: Array
-    emerged: Array
 
 
 # Surroundings, or an empty tuple in deep, calm water: the compiler tells them apart.
 Around: TypeAlias = Any
 
 
-@njit(cache=True, error_model="numpy")
-def _wet_added_mass(a: Surroundings, share: float) -> None:
-    """Added mass of the wet part of every section, into ``a.wet``."""
-    count = a.volume.size
-    a.wet[:] = (1.0 - share) * a.parts[count]
+def surroundings_of(
+    sea: Sea, cells: Cells, drift: Drift, added: Array, parts: Array, specific_weight: float
+) -> Surroundings:
+    """Surroundings with arrays of their own.
+
+    Parameters
+    ----------
+    sea, cells, drift : Waves, cells of the hull and mean loads, shared by threads.
+    added : (6, 6) added mass of the left-hand side. parts : (k + 1, 6, 6) what each section has of
+        it, then the rest. specific_weight : rho g [N/m^3].
+    """
+    sums, count = passage(sea), len(parts) - 1
+    volume = np.bincount(cells.section, weights=cells.volumes, minlength=count).astype(float)
+    floats, places = flat_cells(cells)
+    width = sums.value.shape[1]
+    pieces = (sums.value, sums.slope, floats, drift.loads, parts, volume, np.zeros(count))
+    ends = FOUND + width + np.cumsum([0, *(p.size for p in pieces)])
+    a, b = np.zeros(ends[-1]), np.zeros(PLACES, dtype=np.int64)
+    for start, piece in zip(ends[:-1], pieces, strict=True):
+        a[start : start + piece.size] = piece.ravel()
+    b[AT_VALUE : AT_DRY + 1] = ends[:-1]
+    # The sums are made where the right-hand side looks for them.
+    value, slope = (a[at : at + 2 * width].reshape(2, width) for at in ends[:2])
+    sums = sums._replace(time=a[SPAN_START : SPAN_END + 1], value=value, slope=slope)
+    sums.time[:] = 0.0, -1.0
+    a[FOUND_AT], a[CREST], a[SPECIFIC_WEIGHT] = -1.0, sea.crest, specific_weight
+    a[VOLUME] = float(sum(cells.volumes))
+    a[DECAY], a[LEAST], a[SPEED_STEP] = drift.decay, drift.least, drift.speed_step
+    a[BOX : BOX + 6], a[CELL_BOX : CELL_BOX + 6] = sea.box.ravel(), np.concatenate([cells.low, cells.high])
+    a[ADDED : ADDED + 36] = added.ravel()
+    b[[WAVES, DRIFT]] = sea.waves.amplitude.size > 0, drift.loads.shape[0] > 0
+    b[[WIDTH, WANTED, N_STATIONS]] = width, width - sea.stations - 1, sea.stations
+    b[[N_CELLS, N_SECTIONS]] = cells.volumes.size, count
+    b[[SPEEDS, HEADINGS, DEPTHS]] = drift.loads.shape[:3]
+    return Surroundings(Near(a, np.concatenate([b, places])), sea, sums)
+
+
+@inner
+def _wet_added_mass(a: Array, b: Whole, share: float) -> None:
+    """Added mass of the wet part of every section."""
+    count, parts = b[N_SECTIONS], b[AT_PARTS]
+    for i in range(36):
+        a[WET + i] = (1.0 - share) * a[parts + 36 * count + i]
     for k in range(count):
         # A section that owns no cell comes out with the boat as a whole.
-        left = 1.0 - a.dry[k] / a.volume[k] if a.volume[k] > 0.0 else 1.0 - share
-        for i in range(6):
-            for j in range(6):
-                a.wet[i, j] += left * a.parts[k, i, j]
+        volume, dry = a[b[AT_SECTIONS] + k], a[b[AT_DRY] + k]
+        left = 1.0 - dry / volume if volume > 0.0 else 1.0 - share
+        for i in range(36):
+            a[WET + i] += left * a[parts + 36 * k + i]
 
 
-@njit(cache=True, error_model="numpy")
-def _emerge(a: Surroundings, y: Array) -> float:
+@inner
+def _emerge(a: Array, b: Whole, y: Array) -> float:
     """Emerged share of the volume; load and added mass of what is left into ``a``."""
-    surface = a.found[a.found.size - a.cells.stations.size :]
-    share = lost_buoyancy(a.cells, y, surface, a.specific_weight, a.lost, a.dry)
-    if share > 0.0:
-        _wet_added_mass(a, share)
-    return share
-
-
-def add_loads(around: Around, y: Array, out: Array) -> None:
-    """Add the loads of waves and emergence, X Y Z K M N body axes [N, N m], to ``out``."""
-    share = 0.0
+    width, stations = b[WIDTH], b[N_STATIONS]
+    first, surface, lowest = width - stations, FOUND + width - stations, 0.0
+    if b[WAVES]:
+        span = (a[SPAN_START], a[SPAN_END])
+        blend(a, span[0], span[1], b[AT_VALUE], b[AT_SLOPE], width, a[NOW], first, width, a, FOUND)
+    for i in range(stations):
+        lowest = min(lowest, a[surface + i])
     st, ct = sin(y[10]), cos(y[10])
-    if y[8] + box_top(around.box[0], around.box[1], -st, ct * sin(y[9]), ct * cos(y[9])) < around.crest:
-        share = _emerge(around, y)
+    if y[8] + box_top(a, CELL_BOX, -st, ct * sin(y[9]), ct * cos(y[9])) + lowest > 0.0:
         for i in range(6):
-            out[i] += around.lost[i]
-    around.emerged[0] = share
-    if around.waves:
-        added = around.wet if share > 0.0 else around.added
-        around.mean[:] = 0.0
-        add_mean(around.drift, y, around.mean)
-        for i in range(6):
-            load = (1.0 - share) * (around.found[FORCE + i] + around.mean[i])
-            for j in range(6):
-                load += added[i, j] * around.found[WATER_RATE + j]
-            out[i] += load
+            a[LOST + i] = 0.0
+        return 0.0
+    weight, dry = a[SPECIFIC_WEIGHT], b[AT_DRY]
+    lost = lose(a, b[AT_CELLS], b[N_CELLS], b, PLACES, y, surface, weight, LOST, dry, b[N_SECTIONS])
+    share = lost / a[VOLUME]
+    if share > 0.0:
+        _wet_added_mass(a, b, share)
+    return share
 
 
 def prepare(around: Around, y: Array, time: float) -> None:
     """Make the surroundings ready for a step that starts at ``y`` [SI] and ``time`` [s]."""
-    around.clock[0] = around.clock[1] = time
-    around.clock[2] = -1.0
-    if around.waves:
+    around.near.a[START] = around.near.a[NOW] = time
+    around.near.a[FOUND_AT] = -1.0
+    if around.near.b[WAVES]:
         wave_passage.advance(around.sea, y, time, around.sums)
-
-
-def tick(around: Around, offset: float) -> None:
-    """Set the clock to the start of the step plus ``offset`` [s]."""
-    around.clock[1] = around.clock[0] + offset
-
-
-def observe(around: Around, y: Array) -> None:
-    """Wave quantities and relative velocities of state ``y`` at the time of the clock."""
-    for i in range(12):
-        around.felt[i] = y[i]
-    if around.waves:
-        # Two stages of a step are at the same time.
-        if around.clock[2] != around.clock[1]:
-            wave_passage.interpolate(around.time, around.value, around.slope, around.clock[1], around.found)
-            around.clock[2] = around.clock[1]
-        for i in range(6):
-            around.felt[i] -= around.found[WATER + i]
-
-
-def relative(around: Around, y: Array) -> Array:
-    """State ``y`` with velocities relative to the water, after ``observe``."""
-    return np.asarray(around.felt)
-
-
-def plane_inflow(around: Around, plane: int) -> tuple[float, float, float]:
-    """Velocity of the water at a plane, body axes [m/s], after ``observe``."""
-    if not around.waves:
-        return 0.0, 0.0, 0.0
-    k = PROBES + 3 * plane
-    return around.found[k], around.found[k + 1], around.found[k + 2]
-
-
-def propeller_inflow(around: Around, planes: int) -> float:
-    """Velocity of the water ahead at the propeller [m/s], after ``observe``."""
-    return float(around.found[PROBES + 3 * planes]) if around.waves else 0.0
 
 
 def read_gauge(around: Around, state: Array, rate: Array) -> None:
@@ -172,26 +161,91 @@ def read_gauge(around: Around, state: Array, rate: Array) -> None:
     around : After ``prepare``.
     state, rate : (12,) of the boat at the time of the clock; entry 8 is changed.
     """
-    if around.waves:
-        head, change = wave_passage.gauge(around.sea, around.sums, around.clock[1])
+    if around.near.b[WAVES]:
+        head, change = wave_passage.gauge(around.sea, around.sums, around.near.a[NOW])
         state[8] += head
         rate[8] += change
 
 
-# In deep, calm water none of this is compiled: the compiler chooses by the type of ``around``.
-def _calm_add_loads(around: Around, y: Array, out: Array) -> None:
-    pass
+def near_of(around: Around) -> Around:
+    """What the right-hand side needs of the surroundings; empty in deep, calm water."""
+    return around.near if len(around) else ()
 
 
+def tick(near: Around, offset: float) -> None:
+    """Set the clock to the start of the step plus ``offset`` [s]."""
+    near.a[NOW] = near.a[START] + offset
+
+
+def observe(near: Around, y: Array) -> None:
+    """Wave quantities and relative velocities of state ``y`` at the time of the clock."""
+    a, b = near.a, near.b
+    for i in range(12):
+        a[FELT + i] = y[i]
+    if b[WAVES]:
+        # Two stages of a step are at the same time.
+        if a[FOUND_AT] != a[NOW]:
+            span = (a[SPAN_START], a[SPAN_END])
+            blend(a, span[0], span[1], b[AT_VALUE], b[AT_SLOPE], b[WIDTH], a[NOW], 0, b[WANTED], a, FOUND)
+            a[FOUND_AT] = a[NOW]
+        for i in range(6):
+            a[FELT + i] -= a[FOUND + WATER + i]
+
+
+def relative(near: Around, y: Array) -> tuple[Array, int]:
+    """Where a state with velocities relative to the water stands, after ``observe``: array and place."""
+    return near.a, FELT
+
+
+def plane_inflow(near: Around, plane: int) -> tuple[float, float, float]:
+    """Velocity of the water at a plane, body axes [m/s], after ``observe``."""
+    if not near.b[WAVES]:
+        return 0.0, 0.0, 0.0
+    k = FOUND + PROBES + 3 * plane
+    return near.a[k], near.a[k + 1], near.a[k + 2]
+
+
+def propeller_inflow(near: Around, planes: int) -> float:
+    """Velocity of the water ahead at the propeller [m/s], after ``observe``."""
+    return near.a[FOUND + PROBES + 3 * planes] if near.b[WAVES] else 0.0
+
+
+def add_loads(near: Around, y: Array, out: Array) -> None:
+    """Add the loads of waves and emergence, X Y Z K M N body axes [N, N m], to ``out``."""
+    a, b = near.a, near.b
+    share, mass = 0.0, ADDED
+    st, ct = sin(y[10]), cos(y[10])
+    if y[8] + box_top(a, BOX, -st, ct * sin(y[9]), ct * cos(y[9])) < a[CREST]:
+        share = _emerge(a, b, y)
+        for i in range(6):
+            out[i] += a[LOST + i]
+        if share > 0.0:
+            mass = WET
+    a[EMERGED] = share
+    if b[WAVES]:
+        mean = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+        if b[DRIFT]:
+            size = (b[SPEEDS], b[HEADINGS], b[DEPTHS])
+            mean = mean_load(a, b[AT_DRIFT], size[0], size[1], size[2], a[DECAY], a[LEAST], a[SPEED_STEP], y)
+        for i in range(6):
+            load = (1.0 - share) * (a[FOUND + FORCE + i] + mean[i])
+            for j in range(6):
+                load += a[mass + 6 * i + j] * a[FOUND + WATER_RATE + j]
+            out[i] += load
+
+
+def is_emerged(near: Around) -> bool:
+    """Whether the hull is partly out of the water, after ``add_loads``."""
+    return near.a[EMERGED] > 0.0
+
+
+def wet_change(near: Around, i: int, j: int) -> float:
+    """Added mass of the wet part less that of the left-hand side, one entry."""
+    return near.a[WET + 6 * i + j] - near.a[ADDED + 6 * i + j]
+
+
+# In deep, calm water none of this is compiled: the compiler chooses by the type.
 def _calm_prepare(around: Around, y: Array, time: float) -> None:
-    pass
-
-
-def _calm_tick(around: Around, offset: float) -> None:
-    pass
-
-
-def _calm_observe(around: Around, y: Array) -> None:
     pass
 
 
@@ -199,49 +253,44 @@ def _calm_read_gauge(around: Around, state: Array, rate: Array) -> None:
     pass
 
 
-def _calm_relative(around: Around, y: Array) -> Array:
-    return y
+def _near(around: Around) -> Around:
+    return around.near
 
 
-def _calm_plane_inflow(around: Around, plane: int) -> tuple[float, float, float]:
+def _calm_near(around: Around) -> Around:
+    return ()
+
+
+def _calm_tick(near: Around, offset: float) -> None:
+    pass
+
+
+def _calm_observe(near: Around, y: Array) -> None:
+    pass
+
+
+def _calm_relative(near: Around, y: Array) -> tuple[Array, int]:
+    return y, 0
+
+
+def _calm_plane_inflow(near: Around, plane: int) -> tuple[float, float, float]:
     return 0.0, 0.0, 0.0
 
 
-def _calm_propeller_inflow(around: Around, planes: int) -> float:
+def _calm_propeller_inflow(near: Around, planes: int) -> float:
     return 0.0
 
 
-def _felt(around: Around, y: Array) -> Array:
-    return around.felt
+def _calm_add_loads(near: Around, y: Array, out: Array) -> None:
+    pass
 
 
-def _wave_propeller_inflow(around: Around, planes: int) -> float:
-    return around.found[PROBES + 3 * planes] if around.waves else 0.0
+def _calm_is_emerged(near: Around) -> bool:
+    return False
 
 
-@overload(relative)
-def _choose_relative(around: Around, y: Array) -> object:
-    return _felt if len(around) else _calm_relative
-
-
-@overload(plane_inflow)
-def _choose_plane_inflow(around: Around, plane: int) -> object:
-    return plane_inflow if len(around) else _calm_plane_inflow
-
-
-@overload(propeller_inflow)
-def _choose_propeller_inflow(around: Around, planes: int) -> object:
-    return _wave_propeller_inflow if len(around) else _calm_propeller_inflow
-
-
-@overload(read_gauge)
-def _choose_read_gauge(around: Around, state: Array, rate: Array) -> object:
-    return read_gauge if len(around) else _calm_read_gauge
-
-
-@overload(add_loads)
-def _choose_add_loads(around: Around, y: Array, out: Array) -> object:
-    return add_loads if len(around) else _calm_add_loads
+def _calm_wet_change(near: Around, i: int, j: int) -> float:
+    return 0.0
 
 
 @overload(prepare)
@@ -249,11 +298,51 @@ def _choose_prepare(around: Around, y: Array, time: float) -> object:
     return prepare if len(around) else _calm_prepare
 
 
+@overload(read_gauge)
+def _choose_read_gauge(around: Around, state: Array, rate: Array) -> object:
+    return read_gauge if len(around) else _calm_read_gauge
+
+
+@overload(near_of)
+def _choose_near(around: Around) -> object:
+    return _near if len(around) else _calm_near
+
+
 @overload(tick)
-def _choose_tick(around: Around, offset: float) -> object:
-    return tick if len(around) else _calm_tick
+def _choose_tick(near: Around, offset: float) -> object:
+    return tick if len(near) else _calm_tick
 
 
-@overload(observe)
-def _choose_observe(around: Around, y: Array) -> object:
-    return observe if len(around) else _calm_observe
+@overload(observe, jit_options={"forceinline": True, "error_model": "numpy"})
+def _choose_observe(near: Around, y: Array) -> object:
+    return observe if len(near) else _calm_observe
+
+
+@overload(relative)
+def _choose_relative(near: Around, y: Array) -> object:
+    return relative if len(near) else _calm_relative
+
+
+@overload(plane_inflow)
+def _choose_plane_inflow(near: Around, plane: int) -> object:
+    return plane_inflow if len(near) else _calm_plane_inflow
+
+
+@overload(propeller_inflow)
+def _choose_propeller_inflow(near: Around, planes: int) -> object:
+    return propeller_inflow if len(near) else _calm_propeller_inflow
+
+
+@overload(add_loads, jit_options={"forceinline": True, "error_model": "numpy"})
+def _choose_add_loads(near: Around, y: Array, out: Array) -> object:
+    return add_loads if len(near) else _calm_add_loads
+
+
+@overload(is_emerged)
+def _choose_is_emerged(near: Around) -> object:
+    return is_emerged if len(near) else _calm_is_emerged
+
+
+@overload(wet_change)
+def _choose_wet_change(near: Around, i: int, j: int) -> object:
+    return wet_change if len(near) else _calm_wet_change
