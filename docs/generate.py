@@ -23,6 +23,7 @@ from ident.analysis.derivatives import derivatives
 from ident.checks.findings import rules
 from ident.validation.figures import case_figure
 from ident.validation.scoreboard import entries, run_all
+from sim.bench.guard import recorded
 from sim.boat import catalogue
 from sim.boat.coefficients import Coefficients
 from sim.boat.mass import Environment
@@ -54,6 +55,12 @@ def signs(coefficients: Coefficients) -> str:
         for d in found
     ]
     return table(["derivative", "hull and sail", "whole boat", "expected", "as expected", "SUBOFF, appended"], rows)
+
+
+def speed() -> str:
+    """Recorded times and ratios of the simulator."""
+    rows = [[line.label, f"{line.value:,.3g}", line.unit] for line in recorded()]
+    return table(["", "", "unit"], rows)
 
 
 def number(value: float | None) -> str:
@@ -184,7 +191,7 @@ def main() -> int:
         db = str(Path(folder) / "coeff_db")
         fitted = ident.fit(ROOT / "raw_captive_data", db)[0]
         coefficients = Coefficients(fitted.campaign.vehicle, fitted.rows)
-        readme = {"signs": signs(coefficients)}
+        readme = {"signs": signs(coefficients), "speed": speed()}
         if not (only_check or chosen.quick):
             # A calibration takes minutes, so only a full run renews what follows from it.
             ident.calibrate("bb2", db)

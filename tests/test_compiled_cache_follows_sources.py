@@ -4,40 +4,49 @@ from __future__ import annotations
 
 import importlib
 import os
+import shutil
 import subprocess
 import sys
 import time
 from pathlib import Path
 from types import FunctionType, ModuleType
 
-import numba
 import pytest
 from numba.core.dispatcher import Dispatcher
 
-from sim.compiled_cache import PREFIX, VARIABLE, compiled_sources, remove_stale, sources_key, use_keyed_cache
+from sim.compiled_cache import (
+    PREFIX,
+    VARIABLE,
+    cache_place,
+    compiled_sources,
+    is_ours,
+    remove_stale,
+    sources_key,
+)
+from sim.flight.maneuver import run as run_flight
 
 ROOT = Path(__file__).parents[1]
 SIM = ROOT / "sim"
 
 INNER = """
-from numba import njit
+from sim.compiled import inlined
 from sim.constants import HALF
 
 
-@njit(cache=True, inline="always")
+@inlined
 def inner(x):
     return x * FACTOR * HALF
 """
 OUTER = """
-from numba import njit
+from sim.compiled import outer
 from sim.inner import inner
 
 
-@njit(cache=True)
-def outer(x):
+@outer
+def fill_rate(x):
     return inner(x)
 """
-PROGRAM = "from sim.outer import outer; print(outer(1.0), sum(outer.stats.cache_hits.values()))"
+PROGRAM = "from sim.outer import fill_rate; print(fill_rate(1.0), sum(fill_rate.stats.cache_hits.values()))"
 
 
 @pytest.fixture
@@ -45,7 +54,7 @@ def package(tmp_path):
     """A package ``sim`` of two compiled files, one inlined into the other, with the real rule."""
     folder = tmp_path / "sim"
     folder.mkdir()
-    for name in ("__init__.py", "compiled_cache.py"):
+    for name in ("__init__.py", "compiled.py", "compiled_cache.py"):
         (folder / name).write_text((SIM / name).read_text("utf-8"), "utf-8")
     (folder / "constants.py").write_text("HALF = 0.5\n", "utf-8")
     (folder / "inner.py").write_text(INNER.replace("FACTOR", "2.0"), "utf-8")
@@ -54,78 +63,115 @@ def package(tmp_path):
     return folder
 
 
-def run(folder: Path, program: str = PROGRAM, **environment: str) -> list[str]:
-    """What a fresh process prints with this package, its home a folder of its own."""
+def run(folder: Path, home: Path | None = None) -> tuple[list[str], str]:
+    """What a fresh process prints with this package, its home a folder of its own; and on stderr."""
     clean = {k: v for k, v in os.environ.items() if k not in (VARIABLE, "XDG_CACHE_HOME", "LOCALAPPDATA")}
-    home = {"HOME": str(folder.parent / "home"), "LOCALAPPDATA": str(folder.parent / "home")}
+    place = str(home or folder.parent / "home")
     done = subprocess.run(
-        [sys.executable, "-B", "-c", program],
+        [sys.executable, "-B", "-c", PROGRAM],
         cwd=folder.parent,
-        env={**clean, **home, **environment},
+        env={**clean, "HOME": place, "LOCALAPPDATA": place},
         capture_output=True,
         text=True,
         check=True,
     )
-    return done.stdout.split()
+    return done.stdout.split(), done.stderr
 
 
-def test_an_edit_of_inlined_code_is_seen_in_another_file(package):
-    assert run(package) == ["1.0", "0"]
-    assert run(package) == ["1.0", "1"]  # from the cache: the hazard would be real
+def _kept(folder: Path) -> list[Path]:
+    """Files of compiled functions in the home beside a package."""
+    return sorted((folder.parent / "home").rglob("outer.fill_rate-*.nb?"))
+
+
+def test_an_edit_of_inlined_code_is_seen_and_a_copy_elsewhere_does_not_compile_again(package, tmp_path):
+    values, said = run(package)
+    assert values == ["1.0", "0"]
+    assert said.count("compiling the right-hand side in calm water, once per installation") == 1
+    # From the cache: the hazard would be real.
+    assert run(package) == (["1.0", "1"], "")
+    other = tmp_path / "elsewhere" / "sim"
+    shutil.copytree(package, other)
+    assert run(other, tmp_path / "home") == (["1.0", "1"], "")
     (package / "inner.py").write_text(INNER.replace("FACTOR", "3.0"), "utf-8")
-    # As a child of a process that ran before the edit.
-    assert run(package, **{VARIABLE: str(package.parent / f"{PREFIX}0123456789abcdef")}) == ["1.5", "0"]
+    assert run(package)[0] == ["1.5", "0"]
 
 
-def test_without_the_key_numba_gives_the_stale_value_and_a_users_place_is_kept(package):
-    own = {VARIABLE: str(package.parent / "mine")}
-    assert run(package, **own) == ["1.0", "0"]
-    assert [p.name[:4] for p in (package.parent / "mine").iterdir()] == ["sim_"]
-    (package / "inner.py").write_text(INNER.replace("FACTOR", "3.0"), "utf-8")
-    assert run(package, **own) == ["1.0", "1"]
+def _truncate(path: Path) -> None:
+    path.write_bytes(b"")
+
+
+def _garble(path: Path) -> None:
+    path.write_bytes(b"\x80\x05garbage" * 9)
+
+
+def _share(path: Path) -> None:
+    path.chmod(0o666)
+
+
+@pytest.mark.parametrize("harm", [_truncate, _garble, _share])
+@pytest.mark.parametrize("kind", [".nbc", ".nbi"])
+def test_a_damaged_or_foreign_file_is_compiled_again_and_replaced(package, harm, kind):
+    run(package)
+    harmed = [p for p in _kept(package) if p.suffix == kind]
+    assert harmed
+    for path in harmed:
+        harm(path)
+    assert run(package)[0] == ["1.0", "0"]
+    assert run(package)[0] == ["1.0", "1"]
+
+
+def test_what_another_user_owns_or_could_write_is_not_ours(tmp_path, monkeypatch):
+    file, link = tmp_path / "file", tmp_path / "link"
+    file.write_text("", "utf-8")
+    file.chmod(0o644)
+    link.symlink_to(file)
+    assert is_ours(file)
+    assert not is_ours(link)
+    for mode in (0o664, 0o646):
+        file.chmod(mode)
+        assert not is_ours(file)
+    file.chmod(0o644)
+    monkeypatch.setattr(os, "geteuid", lambda: file.stat().st_uid + 1)
+    assert not is_ours(file)
 
 
 @pytest.fixture
 def home(tmp_path, monkeypatch):
-    """A cache folder of the user's own, no choice made yet, and numba's setting restored after."""
-    monkeypatch.setenv(VARIABLE, "")
-    monkeypatch.setattr(numba.config, "CACHE_DIR", "")
+    """A cache folder of the user's own."""
+    monkeypatch.delenv(VARIABLE, raising=False)
     for name in ("XDG_CACHE_HOME", "LOCALAPPDATA"):
         monkeypatch.setenv(name, str(tmp_path / "home"))
+    cache_place.cache_clear()
     return tmp_path / "home"
 
 
-def test_numba_imported_first_is_told(package, home):
-    use_keyed_cache(package)
-    wanted = home / "ident-submarine" / (PREFIX + sources_key(package))
-    assert wanted.is_dir()
-    assert os.environ[VARIABLE] == numba.config.CACHE_DIR == str(wanted)
+def test_a_folder_that_others_may_write_is_not_used(package, home):
+    shared = home / "ident-submarine"
+    shared.mkdir(parents=True)
+    shared.chmod(0o777)
+    place = cache_place(package)
+    assert place is not None
+    assert shared not in place.parents
 
 
-def test_a_choice_made_in_a_program_is_kept(package, home, monkeypatch):
-    monkeypatch.setattr(numba.config, "CACHE_DIR", "mine")
-    use_keyed_cache(package)
-    assert (numba.config.CACHE_DIR, os.environ[VARIABLE], home.exists()) == ("mine", "", False)
+def test_a_place_of_the_users_choice_is_used(package, home, tmp_path, monkeypatch):
+    monkeypatch.setenv(VARIABLE, str(tmp_path / "mine"))
+    assert cache_place(package) == tmp_path / "mine" / (PREFIX + sources_key(package))
 
 
 def test_the_packages_own_folder_when_home_cannot_be_written(package, home):
     home.write_text("", "utf-8")
-    use_keyed_cache(package)
-    assert str(package / "__pycache__" / (PREFIX + sources_key(package))) == numba.config.CACHE_DIR
+    place = cache_place(package)
+    assert place == package / "__pycache__" / "ident-submarine" / (PREFIX + sources_key(package))
 
 
-def test_nowhere_to_write_compiles_for_one_process(package, home):
-    home.write_text("", "utf-8")
+def test_nowhere_to_write_compiles_at_every_start_and_says_so(package, tmp_path):
+    nowhere = tmp_path / "file"
+    nowhere.write_text("", "utf-8")
     (package / "__pycache__").write_text("", "utf-8")
-    # Without a cache folder at all, numba refuses to compile a cached function.
-    value, hits, place = run(
-        package,
-        f"{PROGRAM}; import os; print(os.environ['{VARIABLE}'])",
-        **dict.fromkeys(("HOME", "LOCALAPPDATA", "XDG_CACHE_HOME"), str(home)),
-    )
-    assert (value, hits) == ("1.0", "0")
-    assert Path(place).name.startswith(PREFIX)
-    assert not Path(place).exists()
+    values, said = run(package, nowhere)
+    assert values == ["1.0", "0"]
+    assert "at every start" in said
 
 
 def test_the_key_follows_compiled_sources_and_what_they_import_only(package):
@@ -160,7 +206,8 @@ def _users() -> list[str]:
     found = []
     for folder in ("sim", "ident"):
         for path in (ROOT / folder).rglob("*.py"):
-            if "numba import" in path.read_text("utf-8"):
+            text = path.read_text("utf-8")
+            if "numba import" in text or "sim.compiled import" in text:
                 found.append(".".join(path.relative_to(ROOT).with_suffix("").parts))
     return sorted(found)
 
@@ -169,7 +216,7 @@ def test_everything_that_compiled_functions_use_is_in_the_key():
     """The rule reads text; this asks the functions themselves."""
     keyed = {".".join(path.relative_to(ROOT).with_suffix("").parts) for path in compiled_sources(SIM)}
     users = _users()
-    assert {"sim.kernel.rhs", "sim.flight.maneuver", "sim.bench.ratios"} <= set(users)
+    assert {"sim.kernel.rhs", "sim.flight.maneuver", "sim.bench.loops"} <= set(users)
     assert {name for name in users if "bench" not in name} <= keyed
     for name in users:
         module = importlib.import_module(name)
@@ -183,8 +230,7 @@ def test_everything_that_compiled_functions_use_is_in_the_key():
 
 
 def test_this_process_uses_it():
-    chosen = Path(os.environ[VARIABLE])
-    if not chosen.name.startswith(PREFIX):
-        pytest.skip(f"{VARIABLE} is the user's own: {chosen}")
-    assert chosen.name == PREFIX + sources_key(SIM)
-    assert str(chosen) == numba.config.CACHE_DIR
+    place = cache_place(SIM)
+    assert place is not None
+    assert place.name == PREFIX + sources_key(SIM)
+    assert run_flight._cache.cache_path == str(place)

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from sim.waves.drift import add_mean, make_drift, tabulate
-from sim.waves.in_waves import volume_points
 from sim.waves.linear import make_waves, regular
 from sim.waves.mean_loads import dipole_body, mean_loads
+from sim.waves.points import volume_points
 from sim.waves.spectra import Spectrum, realise
 
 RHO, G = 1025.0, 9.81

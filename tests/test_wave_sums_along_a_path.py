@@ -11,8 +11,9 @@ from scipy.integrate import solve_ivp
 from sim.boat.mass import Environment, added_mass_matrix
 from sim.waves import loads as wave_loads
 from sim.waves import passage as wave_passage
-from sim.waves.in_waves import probes, section_masses, volume_points, water_around
+from sim.waves.in_waves import water_around
 from sim.waves.linear import Waves, kinematics, regular
+from sim.waves.points import probes, section_masses, volume_points
 from sim.waves.pressure import froude_krylov, rotation
 from sim.waves.spectra import Spectrum, realise
 

@@ -29,7 +29,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.compiled import inlined, inner, outer
+from sim.compiled import inlined, outer
 from sim.waves.linear import Waves
 from sim.waves.pressure import Quadrature, box_top, fill_rotation
 from sim.waves.sums import sum_few, sum_many
@@ -193,7 +193,7 @@ def passage(sea: Sea) -> Passage:
     )
 
 
-@inner
+@inlined
 def _place(sea: Sea, y: Array, time: float, pas: Passage) -> None:
     """Points and their velocities from the shallowest one, in earth axes; phases and sizes there."""
     m, w = pas.matrix, sea.waves
@@ -240,7 +240,7 @@ def _to_body(sums: Array, m: Array, y: Array, body: Array) -> None:
     body[5] -= y[3] * body[1] - y[4] * body[0]
 
 
-@inner
+@inlined
 def _add(points: Array, i: int, fx: float, fy: float, fz: float, out: Array, at: int) -> None:
     """Add a vector acting at a point and its moment about the origin."""
     x, y, z = points[i, 0], points[i, 1], points[i, 2]
@@ -252,7 +252,7 @@ def _add(points: Array, i: int, fx: float, fy: float, fz: float, out: Array, at:
     out[at + 5] += x * fy - y * fx
 
 
-@inner
+@inlined
 def _near(sea: Sea, y: Array, matrix: Array) -> bool:
     """Whether a crest can reach the boat before the next sums; ``matrix`` turns body to earth."""
     rise = sea.span * sqrt(y[0] * y[0] + y[1] * y[1] + y[2] * y[2])

@@ -27,7 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.boat.mass import added_mass_matrix, cross_matrix, rigid_body_matrix
-from sim.waves.in_waves import section_masses, volume_points
+from sim.waves.points import section_masses, volume_points
 
 if TYPE_CHECKING:
     from sim.boat.coefficients import Coefficients

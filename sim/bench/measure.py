@@ -1,0 +1,149 @@
+"""Times of the simulator, and their ratios, all in one process and one run."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from sim.bench.boat import frozen_boat
+from sim.bench.loops import rates, steps
+from sim.boat.coefficients import Coefficients
+from sim.flight.case import Case, load_case
+from sim.flight.plant import Plant
+from sim.flight.simulate import environment_of, fly, simulate
+from sim.kernel import plain
+from sim.kernel.assemble import assemble
+from sim.kernel.layout import Model, workspace
+from sim.waves.in_waves import Water, surroundings, water_around
+from sim.waves.linear import regular
+from sim.waves.spectra import Spectrum, realise, sea_state
+
+COMPONENTS, FLIGHTS, DEPTH = 200, 1000, 10.0
+# Right-hand sides in NumPy of a try, and control samples of a flight of the batch.
+_FEW, _SHORT = 40, 400
+
+
+def shortest(calls: Mapping[str, Callable[[], object]], tries: int) -> dict[str, float]:
+    """Shortest time of each call [s], taken in turn so that other load meets all alike."""
+    best = dict.fromkeys(calls, np.inf)
+    for call in calls.values():
+        call()
+    for _ in range(tries):
+        for name, call in calls.items():
+            start = time.perf_counter()
+            call()
+            best[name] = min(best[name], time.perf_counter() - start)
+    return best
+
+
+def _step_apart(case: Case, coefficients: Coefficients, model: Model) -> tuple[np.ndarray, np.ndarray]:
+    """States a step apart along a flight, near the surface, so that sums meet the boat where they expect it."""
+    flown = simulate(case, coefficients)
+    clock = np.arange(0.0, flown["t"][-1], case.run.step_s)
+    states = np.stack([np.interp(clock, flown["t"], flown.record[:, k]) for k in range(1, 13)], axis=1)
+    states[:, 8] += DEPTH - states[0, 8] - model.sail_top
+    planes = len(coefficients.vehicle.planes)
+    controls = np.stack([np.interp(clock, flown["t"], flown.record[:, 13 + k]) for k in range(planes + 1)], axis=1)
+    return states, controls
+
+
+def _voyage(model: Model, states: np.ndarray, controls: np.ndarray, h: float, water: Water | None) -> None:
+    around = surroundings(water, model.added_mass) if water else ()
+    work, rate, out = workspace(model, around), np.zeros(controls.shape[1]), np.zeros(12)
+    scratch = (work.real, work.whole, work.stage)
+    steps(model.real, model.whole, states, controls, rate, h, around, *scratch, out)
+
+
+def ratios(tries: int = 60, say: Callable[[str], None] = lambda text: None) -> dict[str, Any]:
+    """Times and ratios of the right-hand side, a step, a batch of flights and a plant.
+
+    Parameters
+    ----------
+    tries : Of each time, of which the shortest counts.
+    say : Told what is measured next.
+
+    Returns
+    -------
+    Name -> number: microseconds, steps a second, ratios.
+    """
+    coefficients, (case, _) = frozen_boat(), load_case("hzz20")
+    environment = environment_of(case)
+    model = assemble(coefficients, environment)
+    states, controls = _step_apart(case, coefficients, model)
+    work, dy, h = workspace(model), np.zeros(12), case.run.step_s
+    flat = (model.real, model.whole)
+    few = range(0, len(states), len(states) // _FEW)
+    state = sea_state(5)
+    density, gravity = environment.density, environment.gravity
+    one = regular(state.height, gravity * state.period**2 / (2.0 * np.pi), np.pi, density, gravity)
+    many = realise(Spectrum("bretschneider", state.height, state.period, np.pi, 5.0), COMPONENTS, 1, density, gravity)
+    waters = [water_around(coefficients, environment, waves) for waves in (one, many)]
+    calls: dict[str, Callable[[], object]] = {
+        "rhs": lambda: rates(*flat, states, controls, work.real, work.whole, dy),
+        "calm": partial(_voyage, model, states, controls, h, None),
+        "regular": partial(_voyage, model, states, controls, h, waters[0]),
+        "components": partial(_voyage, model, states, controls, h, waters[1]),
+    }
+    say("right-hand sides and steps")
+    found = {k: v / len(states) for k, v in shortest(calls, tries).items()}
+    say("the same in NumPy")
+    numpy_calls = {"numpy": lambda: [plain.rhs(model, states[i], controls[i]) for i in few]}
+    found["numpy"] = shortest(numpy_calls, max(3, tries // 10))["numpy"] / len(few)
+    say("a plant")
+    plant = Plant(case, coefficients)
+    found["plant"] = shortest({"plant": lambda: [plant.step(dH=0.01) for _ in range(100)]}, tries)["plant"] / 100
+    say(f"{FLIGHTS} flights")
+    batch, busy = _batch(case, coefficients, model)
+    return {
+        "rhs_us": 1e6 * found["rhs"],
+        "rk4_steps_per_s": 1.0 / found["calm"],
+        "numpy_us": 1e6 * found["numpy"],
+        "numpy_ratio": found["numpy"] / found["rhs"],
+        "waves_ratio": found["regular"] / found["calm"],
+        "components_ratio": found["components"] / found["calm"],
+        "batch_steps_per_s": batch,
+        "batch_efficiency": batch * found["calm"] / (os.cpu_count() or 1),
+        "busy_cores": busy,
+        "plant_step_us": 1e6 * found["plant"],
+        "plant_ratio": found["plant"] / found["calm"],
+        "cores": os.cpu_count() or 1,
+    }
+
+
+def _batch(case: Case, coefficients: Coefficients, model: Model) -> tuple[float, float]:
+    """Steps a second of many flights over all cores, trim and all, and how many cores were busy."""
+    run = case.run.model_copy(update={"duration_s": _SHORT * case.run.step_s})
+    short, vehicle = case.model_copy(update={"run": run}), coefficients.vehicle
+    start, used = time.perf_counter(), time.process_time()
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        list(pool.map(lambda k: fly(short, vehicle, model, None), range(FLIGHTS)))
+    elapsed = time.perf_counter() - start
+    return FLIGHTS * _SHORT / elapsed, (time.process_time() - used) / elapsed
+
+
+def jsbsim_us(tries: int = 30) -> dict[str, float]:
+    """Time of ``run()`` of JSBSim's c172x and f16 [us]; empty when it is not installed."""
+    try:
+        import jsbsim
+    except ImportError:
+        return {}
+    found = {}
+    for name, speed in (("c172x", 200.0), ("f16", 500.0)):
+        plane = jsbsim.FGFDMExec(None)
+        plane.set_debug_level(0)
+        plane.load_model(name)
+        plane["ic/h-sl-ft"], plane["ic/u-fps"] = 5000.0, speed
+        plane.run_ic()
+        found[f"jsbsim_{name}_us"] = 1e4 * shortest({"run": partial(_run_often, plane)}, tries)["run"]
+    return found
+
+
+def _run_often(plane: Any) -> None:
+    for _ in range(100):
+        plane.run()
