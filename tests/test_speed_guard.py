@@ -1,0 +1,31 @@
+"""Authority: arithmetic. A ratio a quarter worse than recorded is named, either way round."""
+
+from __future__ import annotations
+
+import pytest
+
+from sim.bench.boat import frozen_boat
+from sim.bench.guard import fallen, recorded
+
+
+def _today(**changes):
+    return {line.name: line.value for line in recorded()} | changes
+
+
+def test_recorded_numbers_pass_and_times_are_not_guarded():
+    times = {line.name: 100.0 * line.value for line in recorded() if not line.better}
+    assert fallen(_today(**times)) == []
+
+
+@pytest.mark.parametrize("line", [line for line in recorded() if line.better], ids=lambda line: line.name)
+def test_a_ratio_that_falls_by_more_than_a_quarter_is_named(line):
+    worse = 0.74 if line.better == "more" else 1.0 / 0.74
+    near = 0.76 if line.better == "more" else 1.0 / 0.76
+    assert fallen(_today(**{line.name: near * line.value})) == []
+    assert [text.split(":")[0] for text in fallen(_today(**{line.name: worse * line.value}))] == [line.name]
+    assert fallen(_today(**{line.name: float("nan")})) != []
+
+
+def test_the_frozen_boat_has_the_shape_of_the_fitted_one(coefficients):
+    shape = {(c.term.name, c.part): c.values.size for c in frozen_boat()}
+    assert shape == {(c.term.name, c.part): c.values.size for c in coefficients}
