@@ -26,7 +26,7 @@ PREFIX = "ident-compiled-"
 # Folders that stay whatever their age, and the age [s] below which any stays.
 _KEPT = 5
 _RECENT = 86400.0
-_IMPORTS = re.compile(r"^(?:from|import) sim((?:\.\w+)+)(?: import \(?([\w\s,]+))?", re.MULTILINE)
+_IMPORTS = re.compile(r"^(?:from|import) sim((?:\.\w+)+)(?: import (\([^)]*\)|[^\n]*))?", re.MULTILINE)
 _MARKS = ("cache=True", "from sim.compiled import")
 
 

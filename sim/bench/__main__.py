@@ -10,7 +10,7 @@ import click
 
 
 @click.command()
-@click.option("--tries", default=60, show_default=True, help="Of each time; the shortest counts.")
+@click.option("--tries", default=300, show_default=True, help="Of each time; the shortest counts.")
 @click.option("--json", "to", help="Write the numbers as JSON to a file, or - for the screen.")
 @click.option("--guard", is_flag=True, help="Fail when a ratio is worse than recorded by more than a quarter.")
 @click.option("--record", "keep", is_flag=True, help="Make this run the recorded one.")

@@ -25,8 +25,9 @@ from sim.waves.linear import regular
 from sim.waves.spectra import Spectrum, realise, sea_state
 
 COMPONENTS, FLIGHTS, DEPTH = 200, 1000, 10.0
-# Right-hand sides in NumPy of a try, and control samples of a flight of the batch.
-_FEW, _SHORT = 40, 400
+# Steps of a try, so few that one in many is not interrupted; right-hand sides in NumPy; steps of a plant; control
+# samples of a flight of the batch.
+_STEPS, _FEW, _PLANT, _SHORT = 400, 1, 20, 400
 
 
 def shortest(calls: Mapping[str, Callable[[], object]], tries: int) -> dict[str, float]:
@@ -60,7 +61,7 @@ def _voyage(model: Model, states: np.ndarray, controls: np.ndarray, h: float, wa
     steps(model.real, model.whole, states, controls, rate, h, around, *scratch, out)
 
 
-def ratios(tries: int = 60, say: Callable[[str], None] = lambda text: None) -> dict[str, Any]:
+def ratios(tries: int = 300, say: Callable[[str], None] = lambda text: None) -> dict[str, Any]:
     """Times and ratios of the right-hand side, a step, a batch of flights and a plant.
 
     Parameters
@@ -75,7 +76,7 @@ def ratios(tries: int = 60, say: Callable[[str], None] = lambda text: None) -> d
     coefficients, (case, _) = frozen_boat(), load_case("hzz20")
     environment = environment_of(case)
     model = assemble(coefficients, environment)
-    states, controls = _step_apart(case, coefficients, model)
+    states, controls = (some[:_STEPS] for some in _step_apart(case, coefficients, model))
     work, dy, h = workspace(model), np.zeros(12), case.run.step_s
     flat = (model.real, model.whole)
     few = range(0, len(states), len(states) // _FEW)
@@ -94,10 +95,10 @@ def ratios(tries: int = 60, say: Callable[[str], None] = lambda text: None) -> d
     found = {k: v / len(states) for k, v in shortest(calls, tries).items()}
     say("the same in NumPy")
     numpy_calls = {"numpy": lambda: [plain.rhs(model, states[i], controls[i]) for i in few]}
-    found["numpy"] = shortest(numpy_calls, max(3, tries // 10))["numpy"] / len(few)
+    found["numpy"] = shortest(numpy_calls, tries)["numpy"] / len(few)
     say("a plant")
     plant = Plant(case, coefficients)
-    found["plant"] = shortest({"plant": lambda: [plant.step(dH=0.01) for _ in range(100)]}, tries)["plant"] / 100
+    found["plant"] = shortest({"plant": lambda: [plant.step(dH=0.01) for _ in range(_PLANT)]}, tries)["plant"] / _PLANT
     say(f"{FLIGHTS} flights")
     batch, busy = _batch(case, coefficients, model)
     return {
