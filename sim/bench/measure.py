@@ -16,7 +16,7 @@ from sim.bench.loops import rates, steps
 from sim.boat.coefficients import Coefficients
 from sim.flight.case import Case, load_case
 from sim.flight.plant import Plant
-from sim.flight.simulate import environment_of, fly, simulate
+from sim.flight.simulate import environment_of, fly, samples_of, simulate
 from sim.kernel import plain
 from sim.kernel.assemble import assemble
 from sim.kernel.layout import Model, workspace
@@ -25,9 +25,8 @@ from sim.waves.linear import regular
 from sim.waves.spectra import Spectrum, realise, sea_state
 
 COMPONENTS, FLIGHTS, DEPTH = 200, 1000, 10.0
-# Steps of a try, so few that one in many is not interrupted; right-hand sides in NumPy; steps of a plant; control
-# samples of a flight of the batch.
-_STEPS, _FEW, _PLANT, _SHORT = 400, 1, 20, 400
+# Steps of a try, so few that one in many is not interrupted; right-hand sides in NumPy; steps of a plant.
+_STEPS, _FEW, _PLANT = 400, 1, 20
 
 
 def shortest(calls: Mapping[str, Callable[[], object]], tries: int) -> dict[str, float]:
@@ -59,6 +58,11 @@ def _voyage(model: Model, states: np.ndarray, controls: np.ndarray, h: float, wa
     work, rate, out = workspace(model, around), np.zeros(controls.shape[1]), np.zeros(12)
     scratch = (work.real, work.whole, work.stage)
     steps(model.real, model.whole, states, controls, rate, h, around, *scratch, out)
+
+
+def _voyages(model: Model, states: np.ndarray, controls: np.ndarray, h: float, _: int) -> None:
+    for _ in range(500):
+        _voyage(model, states, controls, h, None)
 
 
 def ratios(tries: int = 300, say: Callable[[str], None] = lambda text: None) -> dict[str, Any]:
@@ -100,6 +104,7 @@ def ratios(tries: int = 300, say: Callable[[str], None] = lambda text: None) -> 
     plant = Plant(case, coefficients)
     found["plant"] = shortest({"plant": lambda: [plant.step(dH=0.01) for _ in range(_PLANT)]}, tries)["plant"] / _PLANT
     say(f"{FLIGHTS} flights")
+    free = _busy(partial(_voyages, model, states, controls, h), os.cpu_count() or 1)[1]
     batch, busy = _batch(case, coefficients, model)
     return {
         "rhs_us": 1e6 * found["rhs"],
@@ -111,6 +116,7 @@ def ratios(tries: int = 300, say: Callable[[str], None] = lambda text: None) -> 
         "batch_steps_per_s": batch,
         "batch_efficiency": batch * found["calm"] / (os.cpu_count() or 1),
         "busy_cores": busy,
+        "free_cores": free,
         "plant_step_us": 1e6 * found["plant"],
         "plant_ratio": found["plant"] / found["calm"],
         "cores": os.cpu_count() or 1,
@@ -119,13 +125,18 @@ def ratios(tries: int = 300, say: Callable[[str], None] = lambda text: None) -> 
 
 def _batch(case: Case, coefficients: Coefficients, model: Model) -> tuple[float, float]:
     """Steps a second of many flights over all cores, trim and all, and how many cores were busy."""
-    run = case.run.model_copy(update={"duration_s": _SHORT * case.run.step_s})
-    short, vehicle = case.model_copy(update={"run": run}), coefficients.vehicle
+    flight_steps, _ = samples_of(case)
+    elapsed, busy = _busy(lambda k: fly(case, coefficients.vehicle, model, None), FLIGHTS)
+    return FLIGHTS * flight_steps / elapsed, busy
+
+
+def _busy(call: Callable[[int], object], times: int) -> tuple[float, float]:
+    """Time that many calls take over all cores [s], and how many cores they kept busy."""
     start, used = time.perf_counter(), time.process_time()
     with ThreadPoolExecutor(os.cpu_count()) as pool:
-        list(pool.map(lambda k: fly(short, vehicle, model, None), range(FLIGHTS)))
+        list(pool.map(call, range(times)))
     elapsed = time.perf_counter() - start
-    return FLIGHTS * _SHORT / elapsed, (time.process_time() - used) / elapsed
+    return elapsed, (time.process_time() - used) / elapsed
 
 
 def jsbsim_us(tries: int = 30) -> dict[str, float]:
