@@ -16,7 +16,9 @@ from typing import Any
 
 ROOT = Path(__file__).resolve().parents[1]
 # The documentation is of this checkout, whatever copy of the package is installed.
-sys.path.insert(0, str(ROOT))
+sys.path[:0] = [str(ROOT), str(ROOT / "docs")]
+
+from reference_tables import axes_table, key_tables, room_tables, table
 
 import ident
 from ident.analysis.derivatives import derivatives
@@ -30,12 +32,6 @@ from sim.boat.mass import Environment
 from sim.flight.case import load_case
 
 CASE = "hzz20"
-
-
-def table(header: list[str], rows: list[list[str]]) -> str:
-    """A Markdown table."""
-    lines = ["| " + " | ".join(header) + " |", "|" + " --- |" * len(header)]
-    return "\n".join([*lines, *["| " + " | ".join(c.replace("|", "\\|") for c in row) + " |" for row in rows]])
 
 
 def signs(coefficients: Coefficients) -> str:
@@ -204,6 +200,9 @@ def main() -> int:
         ROOT / "docs" / "errata.md": {"errata": errata()},
         ROOT / "docs" / "terms.md": {"terms": term_table()},
         ROOT / "docs" / "checks.md": {"checks": check_table()},
+        ROOT / "docs" / "nomenclature.md": {"axes": axes_table()},
+        ROOT / "docs" / "keys.md": {"keys": key_tables()},
+        ROOT / "docs" / "architecture.md": {"rooms": room_tables()},
     }
     stale = [path for path, blocks in wanted.items() if replace(path, blocks) != path.read_text(encoding="utf-8")]
     if only_check:

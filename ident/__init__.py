@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from ident.output import Results
     from ident.planning.matrix import Need, Plan
     from ident.planning.plan import plan
+    from ident.schemas.describe import schema
     from ident.starter.write import write_starter
     from ident.validation.result import ChannelError, Validation
     from ident.validation.validate import validate
@@ -44,6 +45,7 @@ _PLACES = {
     "validate": "ident.validation.validate",
     "stability": "ident.analysis.stability",
     "write_starter": "ident.starter.write",
+    "schema": "ident.schemas.describe",
     "Plant": "sim.flight.plant",
     "Database": "ident.database.versions",
     "DatabaseVersion": "ident.database.versions",
@@ -76,6 +78,7 @@ __all__ = [  # noqa: RUF022  (in the order of the work)
     "validate",
     "stability",
     "write_starter",
+    "schema",
     "Plant",
     "Database",
     "DatabaseVersion",

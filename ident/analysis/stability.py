@@ -358,7 +358,7 @@ def stability(
     ----------
     .. [1] Feldman, J., "Straightline and rotating arm captive-model experiments to investigate
        the stability and control characteristics of submarines and other submerged vehicles",
-       DTRC/SHD-0303-20, 1987.
+       David Taylor Research Center, Ship Hydromechanics Department, 1987.
 
     Examples
     --------

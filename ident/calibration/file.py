@@ -39,6 +39,14 @@ class Training(Data):
 
     ``differs_from`` names another source of the same case; ``share`` of the mean squared
     difference between the two counts as this source's own variance, channel by channel.
+
+    Attributes
+    ----------
+    case : Bundled case, or a case file beside this one.
+    source : Source of its reference that is trained on.
+    channels : Channels that are trained on; all that the case compares without.
+    differs_from : Another source of the same case that this one contradicts.
+    share : Of the mean squared difference that counts as this source's variance.
     """
 
     case: str
@@ -55,6 +63,14 @@ class Prior(Data):
     vortex-lattice factor on force or roll moment of the plane geometry. ``tail_downwash``:
     factor on force or pitch moment of the sail planes by their vortices at the stern planes.
     ``stated``: mean and sigma with their reason. ``sigma`` widens the others where given.
+
+    Attributes
+    ----------
+    method : What it is from.
+    mean : Of a stated prior, or instead of the method's.
+    sigma : Standard deviation; widens those of the methods.
+    of : Which factor of the method.
+    source : Its reason.
     """
 
     method: Literal["captive", "carry_over", "tail_downwash", "stated"]
@@ -75,6 +91,16 @@ class Group(Data):
 
     ``terms`` and ``parts`` are shell patterns; ``nonzero`` lists axes whose value must not
     be zero, such as beta for what drift adds.
+
+    Attributes
+    ----------
+    name : Of the group.
+    title : For people.
+    terms : Shell patterns of coefficients.
+    parts : Shell patterns of parts.
+    nonzero : Axes whose value is not zero in the values of the group.
+    kind : One ``multiplier`` or one ``offset`` for all of them.
+    prior : What is known before any maneuver.
     """
 
     name: str
@@ -87,7 +113,16 @@ class Group(Data):
 
 
 class CalibrationFile(Data):
-    """A calibration file."""
+    """A calibration file.
+
+    Attributes
+    ----------
+    name : Of the calibration.
+    vehicle : Bundled vehicle, or a vehicle file beside this one.
+    source : Where the training data come from.
+    training : Series that are learnt from.
+    group : Coefficients that share a multiplier or offset.
+    """
 
     name: str
     vehicle: str

@@ -49,7 +49,15 @@ class CampaignFrame(FrameData):
 
 
 class MomentPoint(Data):
-    """Point the moments are about, from the vehicle's origin, in the campaign frame."""
+    """Point the moments are about, from the vehicle's origin, in the campaign frame.
+
+    Attributes
+    ----------
+    x_m : Along x [m].
+    y_m : Along y [m].
+    z_m : Along z [m].
+    about : What the point is, in words.
+    """
 
     x_m: float
     y_m: float
@@ -58,7 +66,14 @@ class MomentPoint(Data):
 
 
 class Scale(Data):
-    """Linear scale ratio (ship over model); length, and draught where one is needed, of the tested body."""
+    """Linear scale ratio (ship over model); length, and draught where one is needed, of the tested body.
+
+    Attributes
+    ----------
+    ratio : Ship over model.
+    length_m : Of the tested body [m].
+    draught_m : Of the tested body, where a norm needs it [m].
+    """
 
     ratio: Annotated[float, Field(gt=0, le=1e4)]
     length_m: Annotated[float, Field(gt=0, le=1e4)]
@@ -66,7 +81,13 @@ class Scale(Data):
 
 
 class Fluid(Data):
-    """Water density of the tests."""
+    """Water density of the tests.
+
+    Attributes
+    ----------
+    density_kgpm3 : Of the water [kg/m^3].
+    source : Where it comes from.
+    """
 
     density_kgpm3: Annotated[float, Field(gt=0, le=1e5)]
     source: str
@@ -169,14 +190,26 @@ class HalfModel(Data):
 
 
 class Uncertainty(Data):
-    """Rule for the standard error of a load."""
+    """Rule for the standard error of a load.
+
+    Attributes
+    ----------
+    floor : Least size of a load that its relative error counts on, as a share of the largest of its kind.
+    source : What the errors rest on.
+    """
 
     floor: Annotated[float, Field(ge=0, le=1)]
     source: str
 
 
 class Quality(Data):
-    """A word of the quality vocabulary: factor on the standard error, and its meaning."""
+    """A word of the quality vocabulary: factor on the standard error, and its meaning.
+
+    Attributes
+    ----------
+    factor : On the standard error of runs with this word.
+    meaning : What the word means.
+    """
 
     factor: Annotated[float, Field(ge=1, le=1e6)]
     meaning: str
@@ -209,7 +242,27 @@ class Tables(Data):
 
 
 class CampaignFile(Data):
-    """Schema of ``campaign.toml``."""
+    """Schema of ``campaign.toml``.
+
+    Attributes
+    ----------
+    name : Of the campaign.
+    vehicle : Bundled vehicle, or a vehicle file beside this one.
+    facility : Tank or code.
+    provenance : Where the runs come from.
+    frame : Axes of loads and rates, and sign of the angles.
+    moment_point : Point the moments are about.
+    scale : Ship over model, and the tested length.
+    fluid : Density of the water.
+    inertia : Whether the loads contain the model's own inertia.
+    uncertainty : Rule for the standard error of a load.
+    quality : Word -> factor on the standard error, and meaning.
+    tare : Loads that are taken off.
+    hydrostatics : Hydrostatic load that the loads contain.
+    half_model : Where only half of the body was tested.
+    tables : Files beside the runs that only the checks look at.
+    source : Which files hold the runs; every CSV beside this file without.
+    """
 
     name: str
     vehicle: str

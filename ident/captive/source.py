@@ -125,10 +125,41 @@ class Source(Data):
     """Some files of a campaign that share a format; every key is in ``docs/readers.md``.
 
     ``within`` limits the states whose loads are used: ``beta_deg = [-20, 20]``. Runs outside
-    stay in the run table with all their loads excluded. ``axes`` and ``moments_about`` say it of
-    these files where they are not as ``[frame]`` says, or the body moves in its axes; ``factor`` divides
-    out what a header does not say, header or quantity -> factor; ``words`` maps words of the files to
-    those of this program.
+    stay in the run table with all their loads excluded.
+
+    Attributes
+    ----------
+    files : Path or glob below the campaign folder; for OpenFOAM the case folders.
+    reader : How they are read; found by content when left out.
+    rows : ``runs``: a row is a run. ``history``: a file is a run.
+    columns : Header -> quantity, perhaps with unit: ``Fx = "X"``.
+    patterns : Regular expression -> quantity; each fits exactly one header.
+    ignore : Headers (with ``*``) to leave out.
+    names : Columns in order, of files without a header.
+    header_pattern : Regular expression that finds the header line.
+    widths : Characters of each column, where numbers touch.
+    units_row : Whether the row below the header holds the units.
+    delimiter : Where it cannot be found out.
+    decimal : Decimal mark, where it cannot be found out.
+    thousands : Mark of digit groups, where it cannot be found out.
+    encoding : Of the text, where no byte order mark says it.
+    skip : Regular expression of lines that are no data.
+    constants : What holds for every run: ``test``, ``part``, ``U = "2 m/s"``.
+    within : State -> lowest and highest value whose loads are used.
+    match : Regular expression over the path; its named groups are constants.
+    normalisation : Of dimensionless columns: ``half_rho_L2`` or ``half_rho_Ld``.
+    parts : OpenFOAM: function object -> part.
+    rho_inf : OpenFOAM: density that the function object used.
+    vehicle_origin : OpenFOAM: the vehicle's origin in mesh axes [m].
+    cofr : OpenFOAM: the point the moments are about, of files whose header does not name it [m].
+    axes : Axes of these files' loads, where they are not as ``[frame]`` says: ``body``, ``flow`` or ``tank``.
+    moments_about : A point that moves with the ``body`` or stays ``fixed``, where the body moves in its axes.
+    factor : Header or quantity -> factor that is divided out, where the header does not say it.
+    missing : Numbers that stand for a value that was not measured.
+    words : Words of the files -> those of this program.
+    reference : What dimensionless columns were made with.
+    reduction : How a time history becomes runs.
+    subtract : Measured loads of parts that are taken off.
     """
 
     files: Annotated[str, Field(min_length=1, max_length=300)]

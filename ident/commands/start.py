@@ -27,3 +27,18 @@ def new(folder: Path, json_path: str | None) -> None:
         click.echo("\n".join(path.as_posix() for path in written))
     if json_path:
         emit({"folder": str(folder), "files": [path.as_posix() for path in written]}, json_path)
+
+
+@click.command()
+@click.argument("kind", type=click.Choice(["vehicle", "campaign", "case", "calibration"]))
+@json_to("Write the schema to a file; it is printed without.")
+def schema(kind: str, json_path: str | None) -> None:
+    """Print the JSON schema of a kind of file, for editors: every key, what it takes and means.
+
+    \b
+    Example: ident schema campaign > campaign.schema.json
+             ident schema case --json case.schema.json
+    """
+    import ident
+
+    emit(ident.schema(kind), json_path or "-")

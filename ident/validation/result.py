@@ -62,7 +62,7 @@ class Validation:
     ----------
     case : What was flown, with the name of the vehicle that flew it.
     simulation : The flight, program frame, SI and radians.
-    reference : What it is held against, in the references' units.
+    reference : What it is held against, source and channel to a record, SI and radians.
     boat : The vehicle with its coefficients.
     db : Path or URL of the database.
     errors : Source -> channel -> error.

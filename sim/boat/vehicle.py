@@ -19,7 +19,14 @@ Vector = Annotated[list[float], Field(min_length=3, max_length=3)]
 
 
 class Number(Data):
-    """A number with its unit and where it comes from."""
+    """A number with its unit and where it comes from.
+
+    Attributes
+    ----------
+    value : The number, in the unit.
+    unit : Its unit; only the one that the key asks for is taken.
+    source : Where it comes from.
+    """
 
     value: float
     unit: str
@@ -27,7 +34,14 @@ class Number(Data):
 
 
 class Triple(Data):
-    """A vector with its unit and where it comes from."""
+    """A vector with its unit and where it comes from.
+
+    Attributes
+    ----------
+    value : Three numbers along the axes of the file, in the unit.
+    unit : Their unit.
+    source : Where they come from.
+    """
 
     value: Vector
     unit: str
@@ -35,7 +49,14 @@ class Triple(Data):
 
 
 class Limits(Data):
-    """A lower and an upper limit with unit and source."""
+    """A lower and an upper limit with unit and source.
+
+    Attributes
+    ----------
+    value : The lower and the upper limit, in the unit.
+    unit : Their unit.
+    source : Where they come from.
+    """
 
     value: Annotated[list[float], Field(min_length=2, max_length=2)]
     unit: str
@@ -63,7 +84,18 @@ Place = Annotated[Triple, _stated("m")]
 
 
 class Particulars(Data):
-    """Mass, inertia and reference points; positions from the body origin."""
+    """Mass, inertia and reference points; positions from the body origin.
+
+    Attributes
+    ----------
+    length : Reference length L [m].
+    mass : Mass with all water inside the envelope [kg].
+    displaced_mass : Mass of the displaced water [kg].
+    radius_of_gyration : About x, y, z through the centre of gravity [m].
+    centre_of_gravity : From the body origin [m].
+    centre_of_buoyancy : From the body origin [m].
+    sail_top : The point whose depth is D0, from the body origin [m].
+    """
 
     length: Length
     mass: Mass
@@ -75,7 +107,16 @@ class Particulars(Data):
 
 
 class Propeller(Data):
-    """Propeller diameter, the limits of its revolutions, and where it is (waves need that)."""
+    """Propeller diameter, the limits of its revolutions, and where it is (waves need that).
+
+    Attributes
+    ----------
+    name : Of the propeller.
+    diameter : D [m].
+    limits : Lowest and highest revolutions [rps].
+    rate : Largest change of the revolutions [rps/s].
+    position : Of the propeller disc from the body origin [m]; waves need it.
+    """
 
     name: str
     diameter: Length
@@ -85,14 +126,34 @@ class Propeller(Data):
 
 
 class Mixer(Data):
-    """Share of the vertical and horizontal command in a plane's deflection, Eq. (1)."""
+    """Share of the vertical and horizontal command in a plane's deflection, Eq. (1).
+
+    Attributes
+    ----------
+    dV : Share of the vertical command.
+    dH : Share of the horizontal command.
+    """
 
     dV: float
     dH: float
 
 
 class Plane(Data):
-    """One control plane: where it is, how it turns, what limits it."""
+    """One control plane: where it is, how it turns, what limits it.
+
+    Attributes
+    ----------
+    name : Of the plane; a part that runs carry loads of.
+    where : In words.
+    position : Of its root or stock from the body origin [m].
+    span_axis : From root to tip; positive deflection turns right-handed about it.
+    leading_edge : Direction of its leading edge at no deflection.
+    mirror : Name of the plane that is its port/starboard image; its own where it has none.
+    mixer : Share of each command in its deflection.
+    limit_deg : Largest deflection either way [deg].
+    rate_degps : Largest rate of deflection [deg/s].
+    source : Where this comes from.
+    """
 
     name: str
     where: str
@@ -113,21 +174,40 @@ class Plane(Data):
 
 
 class Section(Data):
-    """Centre of one added-mass section."""
+    """Centre of one added-mass section.
+
+    Attributes
+    ----------
+    name : Of the section; a part that runs carry loads of.
+    position : Of its centre from the body origin [m].
+    """
 
     name: str
     position: Vector
 
 
 class Sections(Data):
-    """The added-mass sections of Table 6."""
+    """The added-mass sections of Table 6.
+
+    Attributes
+    ----------
+    source : Where the centres come from.
+    centres : Sections from stern to bow.
+    """
 
     source: str
     centres: list[Section]
 
 
 class BallastTank(Data):
-    """Water taken in and pumped out: where, how much, how fast."""
+    """Water taken in and pumped out: where, how much, how fast.
+
+    Attributes
+    ----------
+    position : Of the water from the body origin [m].
+    limit : Largest mass taken in or pumped out [kg].
+    rate : Of pumping [kg/s].
+    """
 
     position: Place
     limit: Mass
@@ -135,21 +215,41 @@ class BallastTank(Data):
 
 
 class TrimTank(Data):
-    """Water moved along the boat, as the shift of the centre of gravity: how far, how fast."""
+    """Water moved along the boat, as the shift of the centre of gravity: how far, how fast.
+
+    Attributes
+    ----------
+    limit : Largest shift of the centre of gravity [m].
+    rate : Of the shift [m/s].
+    """
 
     limit: Length
     rate: Annotated[Number, _stated("m/s", positive=True)]
 
 
 class Tanks(Data):
-    """Ballast and trim tank, Eq. (11)."""
+    """Ballast and trim tank, Eq. (11).
+
+    Attributes
+    ----------
+    ballast : Water taken in and pumped out.
+    trim : Water moved along the boat.
+    """
 
     ballast: BallastTank
     trim: TrimTank
 
 
 class Axes(FrameData):
-    """Declared directions of the body axes and what the origin is."""
+    """Declared directions of the body axes and what the origin is.
+
+    Attributes
+    ----------
+    x : ``forward`` or ``aft``.
+    y : ``starboard`` or ``port``.
+    z : ``down`` or ``up``.
+    origin : Where the origin is, in words; moments of the database are about it.
+    """
 
     origin: str
 
@@ -160,6 +260,23 @@ class Vehicle(Data):
     ``geometry`` names its surface (``sim.hull.surface``), waves need it; ``errata`` a table of what is
     printed wrong in its source and how it is applied (columns equation, printed, corrected,
     consequence), shown in the report. Both are relative to the vehicle file.
+
+    Attributes
+    ----------
+    name : Of the vehicle, as the database names it.
+    title : For people.
+    source : Where the file comes from.
+    term_set : ``reduced``: tables over speed, angle and depth. ``gertler_hagen``: constant coefficients.
+        ``mmg``: ships in surge, sway and yaw.
+    added_mass : ``derivatives`` of the whole boat, or ``sections`` along it.
+    frame : Axes of every vector of the file.
+    particulars : Mass, inertia and reference points.
+    propeller : The propeller.
+    planes : Control planes.
+    sections : Added-mass sections; with ``added_mass = "sections"``.
+    tanks : Ballast and trim tank, where the boat has them.
+    geometry : File of its surface, beside this one; waves need it.
+    errata : Table of what is printed wrong in its source, beside this file.
     """
 
     name: Name

@@ -33,7 +33,14 @@ Name = Annotated[str, AfterValidator(_named)]
 
 
 class FrameData(Data):
-    """Declared directions of the body axes."""
+    """Declared directions of the body axes.
+
+    Attributes
+    ----------
+    x : ``forward`` or ``aft``.
+    y : ``starboard`` or ``port``.
+    z : ``down`` or ``up``.
+    """
 
     x: str
     y: str

@@ -47,8 +47,12 @@ _MOST_STEPS = 1e7
 class EnvironmentData(Data):
     """Water density and gravity.
 
-    ``free_surface``: the hull may come out of the water and loses buoyancy and added mass
-    there; always so in waves, which need the vehicle's geometry alike.
+    Attributes
+    ----------
+    density_kgpm3 : Of the water [kg/m^3].
+    gravity_mps2 : Gravity [m/s^2].
+    free_surface : The hull may come out of the water and loses buoyancy and added mass there; always so in
+        waves, which need the vehicle's geometry alike.
     """
 
     density_kgpm3: Positive
@@ -59,12 +63,21 @@ class EnvironmentData(Data):
 class WavesData(Data):
     """Waves of a case.
 
-    A regular wave has ``height_m`` from crest to trough and ``length_m`` or ``period_s``; a
-    spectrum has ``sea_state`` (``sim/data/sea_states.csv``) or its significant ``height_m`` and
-    peak ``period_s``. ``direction_deg``: where the waves travel to, clockwise from north; a
-    case starts along north, so 180 is a head sea. ``phase_deg`` of a regular wave: zero puts a
-    crest at the earth origin at the start. ``spreading``: s of cos^2s of half the angle; zero
-    is long-crested. ``second_order``: with mean drift forces and suction.
+    Attributes
+    ----------
+    kind : ``regular``, or a spectrum.
+    direction_deg : Where the waves travel to, clockwise from north [deg]; a case starts along north, so 180
+        is a head sea.
+    sea_state : Of ``sim/data/sea_states.csv``; instead of a spectrum's height and period.
+    height_m : Of a regular wave from trough to crest, or significant [m].
+    length_m : Of a regular wave [m].
+    period_s : Of a regular wave, or the spectrum's peak [s].
+    phase_deg : Of a regular wave: zero puts a crest at the earth origin at the start [deg].
+    components : Number of regular waves that make up a spectrum.
+    seed : Of their phases.
+    second_order : With mean drift forces and suction.
+    spreading : Exponent s of cos^2s of half the angle; zero is long-crested.
+    gamma : Peakedness of a JONSWAP spectrum.
     """
 
     kind: Literal["regular", "bretschneider", "jonswap"]
@@ -101,10 +114,18 @@ class WavesData(Data):
 class Initial(Data):
     """Initial state: solved self-propulsion, or the given speed as it is.
 
-    ``trim`` says what keeps a self-propelled boat level: the planes and the pitch that they
-    need; planes and ballast at no pitch; or ballast and trim tank at no pitch and no planes.
-    ``upright``: weight has been shifted across a self-propelled boat against the propeller's
-    torque, as is done before a test.
+    Attributes
+    ----------
+    state : ``self_propulsion``: solved. ``as_given``: the speed as it is.
+    speed_mps : U through the water [m/s].
+    depth_m : D0, depth of the sail top [m].
+    heel_deg : phi [deg].
+    pitch_deg : theta [deg].
+    revolutions_rps : n of a state as given [rps].
+    trim : What keeps a self-propelled boat level: ``planes`` and the pitch that they need; planes and
+        ``ballast`` at no pitch; or ballast and trim tank (``tanks``) at no pitch and no planes.
+    upright : Weight has been shifted across a self-propelled boat against the propeller's torque, as is
+        done before a test.
     """
 
     state: Literal["self_propulsion", "as_given"]
@@ -124,7 +145,15 @@ class Initial(Data):
 
 
 class Run(Data):
-    """Duration, control sample (and integration step), time between records; events that end it."""
+    """Duration, control sample (and integration step), time between records; events that end it.
+
+    Attributes
+    ----------
+    duration_s : Of the run [s].
+    step_s : Control sample and integration step [s].
+    record_s : Time between two records [s].
+    stop : Events that end the run before.
+    """
 
     duration_s: Annotated[float, Field(gt=0, le=1e5)]
     step_s: Annotated[float, Field(gt=0, le=10.0)]
@@ -143,7 +172,17 @@ class Run(Data):
 
 
 class Start(Data):
-    """How the record of one source starts, where it is not as the case starts."""
+    """How the record of one source starts, where it is not as the case starts.
+
+    Attributes
+    ----------
+    source : Where this comes from.
+    speed_mps : U [m/s].
+    depth_m : D0 [m].
+    heel_deg : phi [deg].
+    pitch_deg : theta [deg].
+    revolutions_rps : n [rps].
+    """
 
     source: str
     speed_mps: Annotated[float, Field(gt=0)] | None = None
@@ -156,11 +195,18 @@ class Start(Data):
 class Reference(Data):
     """Where the reference series are and what to compare with them.
 
-    Without ``file`` the case has no bundled reference, and users bring their own.
-    ``abscissa``: the series are over time, or over the path length over ground.
-    ``initial``: sources that are compared with a run from their own start.
-    ``from_start``: channels that are changes since the start, so that every series begins at
-    zero whatever offset it was published with.
+    Attributes
+    ----------
+    file : CSV of the series (source, channel, t or s, value, unit, sigma), beside the case; without it
+        users bring their own.
+    published_model : Source in it that is another model, and so no reference.
+    compare : Sources that the flight is held against.
+    channels : Channels that are compared.
+    abscissa : ``t``: over time [s]. ``s``: over the path length over ground [m].
+    frame : Axes of the series.
+    initial : Source -> its own start; it is compared with a run from there.
+    from_start : Channels that are changes since the start, so that every series begins at zero whatever
+        offset it was published with.
     """
 
     file: str | None = None
@@ -174,7 +220,13 @@ class Reference(Data):
 
 
 class Sweep(Data):
-    """Speeds and depths at which self-propulsion is solved, each with each."""
+    """Speeds and depths at which self-propulsion is solved, each with each.
+
+    Attributes
+    ----------
+    speed_mps : U [m/s].
+    depth_m : D0 [m].
+    """
 
     speed_mps: Annotated[list[Positive], Field(min_length=1)]
     depth_m: Annotated[list[float], Field(min_length=1)]
@@ -183,7 +235,15 @@ class Sweep(Data):
 class Published(Data):
     """A published value of one metric, and the relative deviation that is accepted.
 
-    ``sigma``: standard error of reading it, in its unit.
+    Attributes
+    ----------
+    metric : Name of the metric.
+    source : Who published it.
+    value : The value, in the unit.
+    unit : Its unit.
+    note : Where it is printed.
+    sigma : Standard error of reading it, in its unit.
+    tolerance : Accepted deviation, relative.
     """
 
     metric: str
@@ -196,7 +256,15 @@ class Published(Data):
 
 
 class Tolerance(Data):
-    """Largest accepted RMSE of one channel against one source."""
+    """Largest accepted RMSE of one channel against one source.
+
+    Attributes
+    ----------
+    source : Of the reference.
+    channel : Of the reference.
+    rmse : Largest accepted root mean square error, in the unit.
+    unit : Unit of the channel.
+    """
 
     source: str
     channel: str
@@ -205,7 +273,26 @@ class Tolerance(Data):
 
 
 class Case(Data):
-    """A maneuver case file. ``maneuver`` names the metrics; zigzags and roll decays need none."""
+    """A maneuver case file. ``maneuver`` names the metrics; zigzags and roll decays need none.
+
+    Attributes
+    ----------
+    name : Of the case.
+    title : For people.
+    vehicle : Bundled vehicle, or a vehicle file beside the case.
+    source : Where the case comes from.
+    maneuver : What is measured on it; zigzags and roll decays need none.
+    sail_planes : Whether the sail planes follow dV.
+    environment : Water and gravity.
+    waves : Waves; calm without.
+    initial : The state at the start.
+    run : Duration, step and record.
+    command : Laws of planes, revolutions and tanks.
+    sweep : Speeds and depths at which self-propulsion is solved beside.
+    reference : What the flight is held against.
+    published : Published values of metrics.
+    tolerance : Largest accepted errors.
+    """
 
     name: Name
     title: str

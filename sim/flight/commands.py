@@ -26,6 +26,17 @@ class Event(Data):
     began, either way. ``steady``: its rate of change stayed below this, per second, for
     ``for_s`` seconds. Angles in degrees, rates in degrees per second, the rest in SI; frame
     x forward, z down. D0 is the depth of the sail top; ``point_depth`` that of ``point_m``.
+
+    Attributes
+    ----------
+    after_s : A time since the step began [s].
+    channel : What is watched.
+    above : The channel is above this.
+    below : The channel is below this.
+    change : The channel has gone this far since the step began.
+    steady : Its rate of change stayed below this, per second.
+    for_s : For so long [s].
+    point_m : Point of the body whose depth is watched [m].
     """
 
     after_s: Positive | None = None
@@ -75,9 +86,15 @@ class Event(Data):
 class PlaneStep(Data):
     """One step of dV or dH; it ends with the first of its events.
 
-    ``value_deg``: the command. ``from_trim_deg``: the command less that of the initial
-    equilibrium. ``hold``: the autopilot, its targets moved by ``distance_m`` (down, or to
-    starboard) and ``angle_deg`` (pitch or heading). ``yaw_rate_degps``: the autopilot on r.
+    Attributes
+    ----------
+    value_deg : The command [deg].
+    from_trim_deg : The command less that of the initial equilibrium [deg].
+    hold : The autopilot.
+    distance_m : Its target is moved down, or to starboard [m].
+    angle_deg : Its target is moved in pitch, or heading [deg].
+    yaw_rate_degps : The autopilot on r [deg/s].
+    until : Events that end the step; the first counts.
     """
 
     value_deg: float | None = None
@@ -111,8 +128,21 @@ class PlaneStep(Data):
 class PlaneCommand(Data):
     """Law of dV or dH. Gains in degrees and metres, positive when they steer back.
 
-    ``depth_from``: what dV and the tanks take for the depth: that below the calm surface, or
-    that of a pressure gauge at the body origin, which feels the waves.
+    Attributes
+    ----------
+    law : ``fixed``, ``pid`` (autopilot), ``zigzag`` or ``programme`` (steps).
+    value_deg : Of the fixed law [deg].
+    first_deg : Of a zigzag: the first command; its sign is the side [deg].
+    check_deg : Of a zigzag: the angle that reverses it [deg].
+    limit_deg : Largest command either way [deg].
+    depth_from : What dV and the tanks take for the depth: that below the calm surface, or that of a
+        pressure gauge at the body origin, which feels the waves.
+    P_z, I_z, D_z : Proportional, integral and differential gain on depth [deg/m, deg/(m s), deg s/m].
+    P_theta, I_theta, D_theta : Proportional, integral and differential gain on pitch [deg/deg, 1/s, s].
+    P_y, I_y, D_y : Proportional, integral and differential gain on offset from the track.
+    P_psi, I_psi, D_psi : Proportional, integral and differential gain on heading.
+    P_r, I_r, D_r : Proportional, integral and differential gain on yaw rate.
+    step : Steps of a programme.
     """
 
     law: Literal["fixed", "pid", "zigzag", "programme"]
@@ -156,7 +186,15 @@ class PlaneCommand(Data):
 
 
 class SpeedStep(Data):
-    """One step of the revolutions: a value, a multiple of the initial ones, or speed held."""
+    """One step of the revolutions: a value, a multiple of the initial ones, or speed held.
+
+    Attributes
+    ----------
+    value_rps : Revolutions [rps].
+    times_initial : Revolutions as a multiple of the initial ones.
+    hold : The speed is held.
+    until : Events that end the step; the first counts.
+    """
 
     value_rps: float | None = None
     times_initial: float | None = None
@@ -180,8 +218,13 @@ class SpeedStep(Data):
 class SpeedCommand(Data):
     """Law of the revolutions: initial value kept, PID on the speed ahead, or a programme.
 
-    ``limits_rps`` replaces those of the vehicle, which may be an autopilot's and not the
-    shaft's.
+    Attributes
+    ----------
+    law : ``fixed``: the initial revolutions. ``pid``: on the speed ahead. ``programme``: steps.
+    P_u, I_u, D_u : Proportional, integral and differential gain on speed ahead.
+    limits_rps : Lowest and highest revolutions [rps], instead of the vehicle's, which may be an autopilot's
+        and not the shaft's.
+    step : Steps of a programme.
     """
 
     law: Literal["fixed", "pid", "programme"]
@@ -202,6 +245,14 @@ class TankCommand(Data):
 
     Gains per metre of depth and per degree of pitch, positive when they steer back: too
     deep, ballast is pumped out; bow up, the centre of gravity moves forward.
+
+    Attributes
+    ----------
+    law : ``fixed`` or ``pid``.
+    value : Where it starts, or stays [kg or m].
+    P_z, I_z, D_z : Proportional, integral and differential gain on depth [kg or m for each m].
+    P_theta, I_theta, D_theta : Proportional, integral and differential gain on pitch [kg or m for each
+        deg].
     """
 
     law: Literal["fixed", "pid"]
@@ -220,7 +271,16 @@ class TankCommand(Data):
 
 
 class Commands(Data):
-    """Laws of the vertical and horizontal command, the revolutions and the tanks."""
+    """Laws of the vertical and horizontal command, the revolutions and the tanks.
+
+    Attributes
+    ----------
+    dV : Vertical command: pitch and depth; positive lifts the bow.
+    dH : Horizontal command: heading; positive turns to starboard.
+    n : Revolutions.
+    ballast : Ballast [kg].
+    trim_tank : Shift of the centre of gravity [m].
+    """
 
     dV: PlaneCommand
     dH: PlaneCommand

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -89,7 +90,9 @@ class Plant:
         self.reset()
 
     @classmethod
-    def from_database(cls, case: str, db: str, version: int | None = None, vehicle: str | None = None) -> Plant:
+    def from_database(
+        cls, case: str | Path, db: str | Path, version: int | None = None, vehicle: str | Path | None = None
+    ) -> Plant:
         """A boat of a database version in a bundled case or a case file.
 
         Parameters
@@ -107,7 +110,7 @@ class Plant:
         """
         data, where = load_case(case)
         boat = load_vehicle(vehicle) if vehicle else load_vehicle(data.vehicle, beside=where)
-        return cls(data, Coefficients(boat, read_rows(db, version, boat.name)[0]))
+        return cls(data, Coefficients(boat, read_rows(str(db), version, boat.name)[0]))
 
     def reset(self) -> None:
         """Back to the start: time zero, initial state and controls, the commands that hold them."""
