@@ -1,0 +1,73 @@
+"""What the pages show in Python runs as it stands there: how-to, the README, the plant model, the right-hand side."""
+
+from __future__ import annotations
+
+import re
+import shutil
+from pathlib import Path
+
+import matplotlib
+import numpy as np
+import pytest
+
+import ident
+
+ROOT = Path(__file__).parents[1]
+
+
+@pytest.fixture(scope="module")
+def desk(tmp_path_factory):
+    """The starter boat and BB2 in one database, the newer last, as the pages have them."""
+    matplotlib.use("Agg")
+    folder = tmp_path_factory.mktemp("pages")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(folder)
+        ident.write_starter("my-boat")
+        shutil.copytree(ROOT / "raw_captive_data" / "bb2", "raw_captive_data/bb2")
+        ident.fit("my-boat/captive", db="coeff_db")
+        ident.fit("raw_captive_data/bb2", db="coeff_db")
+        yield folder
+
+
+def _blocks(name, heading=""):
+    text = (ROOT / name).read_text("utf-8")
+    text = text[text.index(heading) :]
+    return re.findall(r"```python\n(.*?)```", text, re.DOTALL)
+
+
+def test_the_six_things_run_as_they_stand(desk):
+    names: dict[str, object] = {}
+    blocks = _blocks("docs/how-to.md")
+    assert len(blocks) == 4
+    for block in blocks:
+        exec(compile(block.replace("with_bands(200)", "with_bands(4)"), "docs/how-to.md", "exec"), names)
+    point = names["point"]
+    assert point.runs.item()
+    assert "drift_horizontal.csv row" in point.source.item()
+    assert names["yaw"].dims == ("beta_deg",)
+    assert names["done"].errors["TRIAL"]["psi"].rmse > 0.0
+    assert len(names["change"]) > 0
+
+
+def test_the_readme_runs_as_it_stands(desk):
+    (block,) = _blocks("README.md")
+    exec(
+        compile(block.replace('[0]["N_uvw"]', '[-1]["N_uvw"]').replace("version=0", "version=1"), "README.md", "exec"),
+        {},
+    )
+
+
+def test_the_plant_of_the_page_turns_to_its_heading(desk):
+    (block,) = _blocks("docs/plant-model.md")
+    names: dict[str, object] = {}
+    exec(compile(block, "docs/plant-model.md", "exec"), names)
+    assert np.degrees(names["boat"]["psi"]) == pytest.approx(30.0, abs=5.0)
+
+
+def test_the_right_hand_side_of_the_page_stays_at_its_equilibrium(desk):
+    (block,) = _blocks("docs/architecture.md", "## The right-hand side")
+    names: dict[str, object] = {}
+    exec(compile(block, "docs/architecture.md", "exec"), names)
+    flown, trim = names["flown"], names["trim"]
+    assert flown.success
+    np.testing.assert_allclose(flown.y[:6, -1], trim.state[:6], atol=1e-3)
