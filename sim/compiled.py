@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import hashlib
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -38,8 +39,11 @@ class _Locator:
         return str(self._place)
 
     def get_source_stamp(self) -> str:
-        """The name of the folder: a digest of all sources."""
-        return self._place.name
+        """The name of the folder, a digest of all sources; with the own file's where it is not one of them."""
+        file = Path(self._py_file)
+        if _PACKAGE in file.resolve().parents:
+            return self._place.name
+        return f"{self._place.name} {hashlib.sha256(file.read_bytes()).hexdigest()}"
 
     def get_disambiguator(self) -> str:
         """Module and line."""

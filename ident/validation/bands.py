@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,6 +16,7 @@ from scipy.special import chdtri
 from ident.text import on_screen
 from ident.validation.cluster import over_dask
 from ident.validation.draws import draw, scores
+from ident.validation.products import product
 from sim.boat.coefficients import Coefficients
 from sim.boat.row_codec import correlation_matrix
 from sim.boat.vehicle import Vehicle
@@ -61,11 +62,37 @@ class Bands:
     estimates: list[str]
     failed: int
     seed: int
+    _edges: dict[tuple[str, str], dict[float, Array]] = field(default_factory=dict, repr=False, compare=False)
+    _scores: dict[str, Array] = field(default_factory=dict, repr=False, compare=False)
+
+    def scores(self) -> dict[str, Array]:
+        """Independent scores of each coefficient, (samples, rank), mean zero."""
+        if not self._scores:
+            names = np.array(self.estimates)
+            for coefficient in dict.fromkeys(self.estimates):
+                places = np.flatnonzero(names == coefficient)
+                own = scores(self.draws[:, places], self.correlation[np.ix_(places, places)])
+                self._scores[coefficient] = own - own.mean(axis=0)
+        return self._scores
 
     def band(self, channel: str, level: str, source: str = "") -> tuple[Array, Array]:
         """Lower and upper edge of the 50 or 95 % band of a channel, as a source's record starts."""
-        low, high = np.nanpercentile(self.own.get(source, self.channels)[channel], LEVELS[level], axis=0)
-        return np.asarray(low), np.asarray(high)
+        key = (channel, source)
+        if key not in self._edges:
+            self._edges[key] = _percentiles(self.own.get(source, self.channels)[channel])
+        low, high = (self._edges[key][p] for p in LEVELS[level])
+        return low, high
+
+
+def _percentiles(values: Array) -> dict[float, Array]:
+    """Every edge of the bands of (samples, rows), those of samples that have ended left out."""
+    wanted = sorted({p for edges in LEVELS.values() for p in edges})
+    found = np.percentile(values, wanted, axis=0)
+    # Few columns have ended samples, and what leaves them out goes column by column.
+    ended = ~np.isfinite(values).all(axis=0)
+    if ended.any():
+        found[:, ended] = np.nanpercentile(values[:, ended], wanted, axis=0)
+    return dict(zip(wanted, found, strict=True))
 
 
 def _row_steps(rows: pd.DataFrame, estimates: pd.DataFrame) -> tuple[NDArray[np.int64], Array]:
@@ -247,17 +274,14 @@ def inside(bands: Bands, case: Case, reference: Series) -> dict[str, Any]:
     return found
 
 
-def _summed(values: Array, axis: int) -> Array:
-    """Sums along an axis: numpy adds in one order everywhere, which a product of matrices does not."""
-    return np.asarray(np.ascontiguousarray(values).sum(axis=axis))
-
-
-def _without_each(scores: Array, spread: Array) -> tuple[float, Array]:
+def _without_each(scores: Array, along: Array, own: Array) -> tuple[float, Array]:
     """Share of the variance of a channel that goes with the scores, of all samples and without each.
 
     Parameters
     ----------
-    scores : (samples, rank), mean zero. spread : (samples, records), mean zero.
+    scores : (samples, rank), mean zero.
+    along : (samples, rank) G times the scores, with G the products of the samples' departures from
+        the mean of the channel, summed over the record. own : (samples,) diagonal of G.
 
     Returns
     -------
@@ -267,16 +291,11 @@ def _without_each(scores: Array, spread: Array) -> tuple[float, Array]:
     samples = len(scores)
     # What a sum of products about the mean loses with a sample is this times the sample's product.
     lost = samples / (samples - 1.0)
-    own = _summed(spread**2, 1)
     total = float(own.sum())
-    share, without = 0.0, np.zeros(samples)
-    for score in np.ascontiguousarray(scores.T):
-        along = _summed(score[:, None] * spread, 0)
-        square, size = float((along**2).sum()), float((score**2).sum())
-        share += square / size / total
-        left = square - 2.0 * lost * score * _summed(spread * along, 1) + (lost * score) ** 2 * own
-        without += left / (size - lost * score**2) / (total - lost * own)
-    return share, without
+    square, size = (scores * along).sum(axis=0), (scores**2).sum(axis=0)
+    left = square - 2.0 * lost * scores * along + (lost * scores) ** 2 * own[:, None]
+    without = (left / (size - lost * scores**2)).sum(axis=1) / (total - lost * own)
+    return float((square / size).sum()) / total, without
 
 
 def variance_shares(bands: Bands, channel: str, most: int = 8) -> list[dict[str, Any]]:
@@ -307,15 +326,15 @@ def variance_shares(bands: Bands, channel: str, most: int = 8) -> list[dict[str,
     spread = values[:, complete] - values[:, complete].mean(axis=0)
     if len(values) < 3 or not spread.any():
         return []
-    names = np.array(bands.estimates)
-    coefficients = list(dict.fromkeys(bands.estimates))
-    found = []
-    for coefficient in coefficients:
-        places = np.flatnonzero(names == coefficient)
-        own = scores(bands.draws[:, places], bands.correlation[np.ix_(places, places)])
+    every = bands.scores()
+    products = product(spread, spread.T)
+    along = product(products, np.concatenate(list(every.values()), axis=1))
+    found, first = [], 0
+    for coefficient, own in every.items():
         samples, rank = own.shape
-        share, without = _without_each(own - own.mean(axis=0), spread)
-        if samples * share <= chdtri(rank, _BY_CHANCE / len(coefficients)):
+        share, without = _without_each(own, along[:, first : first + rank], np.diag(products))
+        first += rank
+        if samples * share <= chdtri(rank, _BY_CHANCE / len(every)):
             continue
         error = np.sqrt((samples - 1.0) / samples * ((without - without.mean()) ** 2).sum())
         one = {"share": min(share - rank / samples, 1.0), "standard_error": float(error)}
@@ -327,12 +346,15 @@ def variance_shares(bands: Bands, channel: str, most: int = 8) -> list[dict[str,
 def summary(bands: Bands, case: Case, reference: Series) -> dict[str, Any]:
     """What the JSON result says of the bands."""
     channels = case.reference.channels if case.reference else []
+    bands.scores()
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        shares = dict(zip(channels, pool.map(lambda channel: variance_shares(bands, channel), channels), strict=True))
     return {
         "samples": len(bands.draws),
         "failed": bands.failed,
         "seed": bands.seed,
         "inside": inside(bands, case, reference),
-        "variance_shares": {c: variance_shares(bands, c) for c in channels},
+        "variance_shares": shares,
     }
 
 

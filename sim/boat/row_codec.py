@@ -82,7 +82,9 @@ def correlation_texts(covariance: Array, names: Iterable[int] | None = None) -> 
 
 def correlation_pairs(text: str) -> dict[int, float]:
     """One ``correlation`` cell: estimate number -> correlation coefficient."""
-    return {int(k): float(v) for k, v in (item.split(":") for item in text.split())}
+    # One split for all of them: a cell may hold some hundred.
+    words = text.replace(":", " ").split()
+    return dict(zip(map(int, words[::2]), map(float, words[1::2]), strict=True))
 
 
 def correlation_matrix(rows: pd.DataFrame) -> tuple[pd.DataFrame, Array]:
