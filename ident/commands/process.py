@@ -9,6 +9,7 @@ import sys
 import threading
 from collections.abc import Iterator
 from types import FrameType
+from typing import NoReturn
 
 # What an interrupted command has to end by itself [s]: files half-written are removed, locks are left.
 _GRACE = 1.0
@@ -59,6 +60,13 @@ def _watch(pipe: int, ended: threading.Event) -> None:
                 os._exit(128 + number[0])
 
 
+def _leave(code: int) -> NoReturn:
+    for stream in (sys.stdout, sys.stderr):
+        with contextlib.suppress(OSError, ValueError):
+            stream.flush()
+    os._exit(code)
+
+
 @contextlib.contextmanager
 def ends_when_asked() -> Iterator[None]:
     """Ctrl-C and SIGTERM end what runs inside within two seconds, in native code and worker threads too.
@@ -78,15 +86,13 @@ def ends_when_asked() -> Iterator[None]:
     threading.Thread(target=_watch, args=(pipe, ended), daemon=True).start()
     try:
         yield
-        ended.set()
-    except (KeyboardInterrupt, Terminated):
-        # Python waits for the threads of a pool before it ends; the watch does not.
-        raise
-    except BaseException as error:
-        if getattr(error, "code", 0) not in (128 + signal.SIGINT, 128 + signal.SIGTERM):
-            ended.set()
+    except SystemExit as asked:
+        if asked.code in (128 + signal.SIGINT, 128 + signal.SIGTERM) and sys.stdout is sys.__stdout__:
+            # Python would wait for the threads of a pool, and change the code where it met the signal itself.
+            _leave(asked.code)
         raise
     finally:
+        ended.set()
         signal.set_wakeup_fd(told)
         signal.signal(signal.SIGTERM, before)
         os.close(end)
