@@ -111,6 +111,12 @@ class Group(Data):
     kind: Literal["multiplier", "offset"] = "multiplier"
     prior: Prior
 
+    @model_validator(mode="after")
+    def _multipliers_turn_nothing_around(self) -> Group:
+        if self.kind == "multiplier" and self.prior.mean is not None and self.prior.mean <= 0.0:
+            raise ValueError("a mean above zero: a multiplier of less turns a load around")
+        return self
+
 
 class CalibrationFile(Data):
     """A calibration file.

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ident.commands.shared import DB, MESSAGE, OUT, VERSION, WAIT, console_for, emit, equilibrium_of, json_to
-from ident.text import in_file_name, on_screen
+from ident.text import in_file_name, on_screen, visible
 
 if TYPE_CHECKING:
     from ident.validation.result import Validation
@@ -95,6 +95,10 @@ def validate(
         console.print(f"figure: {on_screen(figure)}", highlight=False)
     if json_path:
         emit(done[0].to_dict() if board is None else board, json_path)
+    unfinished = [one.case.name for one in done if not one.complete]
+    if unfinished:
+        click.echo(f"left the finite numbers: {', '.join(map(visible, unfinished))}", err=True)
+        raise click.exceptions.Exit(1)
     if strict and not all(one.passed for one in done):
         raise click.exceptions.Exit(1)
 
@@ -181,8 +185,8 @@ def calibrate(
 @DB
 @VERSION
 @click.option("--case", "case", default="hzz20", show_default=True, help="Case that gives vehicle and environment.")
-@click.option("--speed", "speeds", type=click.FloatRange(min=0, min_open=True), multiple=True, help="U [m/s]; repeat.")
-@click.option("--depth", "depths", type=click.FloatRange(min=0), multiple=True, help="D0 [m]; repeat.")
+@click.option("--speed", "speeds", type=click.FloatRange(0, 100, min_open=True), multiple=True, help="U [m/s]; repeat.")
+@click.option("--depth", "depths", type=click.FloatRange(0, 11000), multiple=True, help="D0 [m]; repeat.")
 @json_to("Write the results as JSON.")
 def stability(
     db: str,

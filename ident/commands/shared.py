@@ -127,9 +127,14 @@ def emit(data: Any, target: str) -> None:
     Raises
     ------
     sim.files.errors.InputError
-        When the file cannot be written.
+        When the file cannot be written, or a number is not finite.
     """
-    text = json.dumps(data, indent=2, allow_nan=False)
+    from sim.files.errors import InputError
+
+    try:
+        text = json.dumps(data, indent=2, allow_nan=False)
+    except ValueError as error:
+        raise InputError("the result", "a number that is not finite", "input whose results are numbers") from error
     if target == "-":
         click.echo(text)
         return

@@ -189,6 +189,12 @@ def fit(
     return Results(done)
 
 
+def _relative_error(rows: pd.DataFrame) -> float | None:
+    """Median of standard errors over values that are not zero; None without such a value."""
+    some = rows[rows["value"] != 0.0]
+    return None if some.empty else float((some["stderr"] / some["value"].abs()).median())
+
+
 def coefficient_table(rows: pd.DataFrame) -> list[dict[str, Any]]:
     """One row a coefficient: points, runs, worst disagreement, points by quality."""
     table = []
@@ -201,7 +207,7 @@ def coefficient_table(rows: pd.DataFrame) -> list[dict[str, Any]]:
                 "points": len(group),
                 "measured": len(own),
                 "runs": len({r for text in group["runs"] for r in text.split()}),
-                "median_relative_error": float((counted["stderr"] / counted["value"].abs()).median()),
+                "median_relative_error": _relative_error(counted),
                 "worst_residual": float(group["worst_residual"].max()),
                 "quality": dict(Counter(q for q in counted["quality"] if q)),
             }
@@ -245,7 +251,7 @@ def show(done: Fit, console: Console) -> None:
             str(row["points"]),
             str(row["measured"]),
             str(row["runs"]),
-            f"{100 * row['median_relative_error']:.1f} %",
+            "-" if row["median_relative_error"] is None else f"{100 * row['median_relative_error']:.1f} %",
             f"[red]{worst:.1f} s.e.[/]" if worst > 2 else f"{worst:.1f} s.e." if worst else "-",
             ", ".join(words),
         )

@@ -33,6 +33,8 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 # Samples handed out at once: enough that handing out costs nothing, few enough for a progress bar.
 CHUNK = 8
+# Of a machine that does not say how much memory it has [bytes].
+_LEAST_MEMORY = 4e9
 # Probability that chance alone lists a coefficient as a cause of a channel's width.
 _BY_CHANCE = 0.01
 LEVELS = {"50": (25.0, 75.0), "95": (2.5, 97.5)}
@@ -164,15 +166,42 @@ def batch_of(case: Case, vehicle: Vehicle, rows: pd.DataFrame) -> Batch:
     )
 
 
+def _check_room(case: Case, vehicle: Vehicle, rows: pd.DataFrame, samples: int) -> None:
+    """Refuse more samples than the memory of this machine holds, before any is drawn. Raises ``InputError``."""
+    sources = case.reference.compare if case.reference else []
+    flights = 1 + sum(case.started_as(s) is not None for s in sources)
+    steps, every = samples_of(case)
+    channels = len(columns_of(vehicle, uses_tanks(case))) + len(DERIVED)
+    # A record is copied once where samples failed; a draw is kept beside the values it gives.
+    each = 8 * (2 * flights * channels * (steps // every + 1) + 3 * len(rows))
+    room = _memory()
+    if samples * each > room:
+        text = f"{samples} samples of {each / 1e6:.3g} MB each"
+        raise InputError("--samples", text, f"{max(int(room / each), 0)} at most in {room / 1e9:.3g} GB of memory")
+
+
+def _memory() -> float:
+    """Memory of this machine [bytes]; where it cannot be asked, what every machine has."""
+    try:
+        return float(os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"))
+    except (AttributeError, ValueError, OSError):
+        return _LEAST_MEMORY
+
+
 def _over_threads(
     batch: Batch, chunks: Sequence[Array], workers: int | None
 ) -> Iterator[tuple[int, list[dict[str, Array] | None]]]:
     """Place of a chunk and its flights, as they are done."""
     with ThreadPoolExecutor(workers or os.cpu_count()) as pool:
         place = {pool.submit(batch.fly, chunk): i for i, chunk in enumerate(chunks)}
-        for future in as_completed(list(place)):
-            # Popped, so that its flights are not kept.
-            yield place.pop(future), future.result()
+        try:
+            for future in as_completed(list(place)):
+                # Popped, so that its flights are not kept.
+                yield place.pop(future), future.result()
+        except BaseException:
+            # Who stops here does not wait for what has not begun.
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
 
 
 def fly_samples(
@@ -206,8 +235,10 @@ def fly_samples(
     Raises
     ------
     InputError
-        When no sample has a self-propulsion state, or as ``ident.validation.cluster.over_dask``.
+        When no sample has a self-propulsion state, for more samples than the memory holds, or as
+        ``ident.validation.cluster.over_dask``.
     """
+    _check_room(case, vehicle, rows, samples)
     estimates, correlation = correlation_matrix(rows)
     draws = draw(correlation, samples, seed)
     index, step = _row_steps(rows, estimates)

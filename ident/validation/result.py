@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from ident.output import html_table
 from sim.boat.database import version_words
 
@@ -109,6 +111,11 @@ class Validation:
     bands: Bands | None = None
     saturated: list[dict[str, Any]] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
+
+    @property
+    def complete(self) -> bool:
+        """Whether the flight went to its end in finite numbers."""
+        return bool(np.isfinite(self.simulation.end).all())
 
     @property
     def version(self) -> int:

@@ -263,6 +263,7 @@ def validate(
     check_answers(simulation, flown, ship)
     found = errors(flown, series, simulation, as_started)
     found_on = measured(flown, simulation, series, as_started)
+    _check_numbers(found_on.metrics, where)
     model = boat.model(flown)
     # Adds its revolutions to the metrics.
     grid = with_grid(flown, ship, model, found_on.metrics)
@@ -286,6 +287,15 @@ def validate(
         saturated=saturated(simulation, flown, ship),
         notes=notes,
     )
+
+
+def _check_numbers(metrics: dict[str, Any], where: str) -> None:
+    """Refuse metrics that are no numbers. Raises ``InputError`` naming the first."""
+    for name, columns in metrics.items():
+        for value in columns.values():
+            if value is not None and not np.isfinite(value):
+                text = f"metric {name} is {value}"
+                raise InputError(where, text, "a maneuver that the metrics of its kind are defined for")
 
 
 def _complete(simulation: Simulation) -> bool:

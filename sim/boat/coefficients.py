@@ -10,17 +10,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.boat import catalogue
 from sim.boat.catalogue import Term
 from sim.boat.database import axis_columns, from_column
 from sim.boat.parts import parts_of, vehicle_terms
 from sim.boat.tables import Table
 from sim.boat.vehicle import Vehicle
+from sim.files.errors import InputError
 
 if TYPE_CHECKING:
     import pandas as pd
 
 Array = NDArray[np.float64]
+_SAME_BOAT = "the term set, planes and sections that the database's coefficients are of"
 
 
 @dataclass(frozen=True)
@@ -47,8 +48,8 @@ class Coefficients:
 
     Raises
     ------
-    catalogue.CatalogueError
-        When a row names a coefficient the vehicle's term set does not have.
+    InputError
+        When a row names a coefficient that the vehicle's term set does not have, or a part that it does not have.
 
     Attributes
     ----------
@@ -59,13 +60,18 @@ class Coefficients:
         self.vehicle = vehicle
         self.places: dict[tuple[str, str], NDArray[np.int64]] = {}
         columns = {axis: column for column, axis in axis_columns().items()}
-        known = {t.name: t for t in vehicle_terms(vehicle)}
+        known, parts = {t.name: t for t in vehicle_terms(vehicle)}, vehicle.part_names()
         self._all: dict[tuple[str, str], Coefficient] = {}
         places = rows.reset_index(drop=True).groupby(["coefficient", "part"], sort=False)
         for key, group in places:
             name, part = (str(k) for k in key)
             if name not in known:
-                raise catalogue.CatalogueError(f"{vehicle.name}: {name!r} is not a term of its set")
+                raise InputError(
+                    f"vehicle {vehicle.name}", f"coefficient {name!r} is not a term of its set", _SAME_BOAT
+                )
+            if part not in parts:
+                text = f"coefficients of {part!r}, which is none of its parts: {', '.join(parts)}"
+                raise InputError(f"vehicle {vehicle.name}", text, _SAME_BOAT)
             term = known[name]
             used = [columns[a] for a in term.axes]
             points = np.array(

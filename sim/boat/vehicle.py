@@ -10,6 +10,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import AfterValidator, Field, field_validator
 
+from sim.boat.plausible import check_vehicle
 from sim.files import inputs
 from sim.files.errors import InputError
 from sim.files.frames import PROGRAM, Frame
@@ -382,13 +383,14 @@ def load_vehicle(name: str | Path, beside: str | Path = "") -> Vehicle:
     Raises
     ------
     InputError
-        For a missing file, a missing or unknown key, or a value out of range.
+        For a missing file, a missing or unknown key, a value out of range, or as ``check_vehicle``.
     """
     path = Path(name)
     there = Path(beside).parent / path if path.suffix == ".toml" else name
     data, where = read_toml(there, "vehicles", f"{beside}, key vehicle" if str(beside) else "")
     vehicle = checked(Vehicle, data, where)
     vehicle.frame.declared(where)
+    check_vehicle(vehicle, where)
     folder = Path(where).parent if Path(where).suffix == ".toml" else Path(str(files("sim") / "vehicles"))
     for key in ("geometry", "errata"):
         if getattr(vehicle, key) is not None:

@@ -11,9 +11,9 @@ from sim.files.frames import Frame, FrameError
 
 
 class Data(BaseModel):
-    """A part of a data file: unknown keys and non-finite numbers are refused."""
+    """A part of a data file: unknown keys, non-finite numbers and text or yes and no for numbers are refused."""
 
-    model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False, strict=True)
 
 
 def _named(name: str) -> str:
@@ -63,16 +63,26 @@ class FrameData(Data):
 _LARGEST = 1e15
 
 
-def _too_large(data: Any, key: str = "") -> tuple[str, str] | None:
-    """The first number of parsed data that no file means, with its key."""
-    if isinstance(data, dict):
-        parts = ((f"{key}.{k}" if key else str(k), v) for k, v in data.items())
-    elif isinstance(data, list):
-        parts = ((f"{key}[{i}]", v) for i, v in enumerate(data))
-    else:
-        number = isinstance(data, int | float) and not isinstance(data, bool)
-        return (key, str(data)[:24]) if number and abs(data) > _LARGEST else None
-    return next((found for k, v in parts if (found := _too_large(v, k))), None)
+# A file of deeper parts is none of this program's.
+_DEEPEST = 20
+
+
+def _too_large(data: Any) -> tuple[str, str, str] | None:
+    """The first number of parsed data that no file means, or the part too deep, with its key and what is allowed."""
+    left = [("", data, 0)]
+    while left:
+        key, part, depth = left.pop()
+        if depth > _DEEPEST:
+            return key[:80], f"parts in parts, {_DEEPEST} deep", "a file of this program's"
+        if isinstance(part, dict):
+            left += [(f"{key}.{k}" if key else str(k), v, depth + 1) for k, v in reversed(part.items())]
+        elif isinstance(part, list):
+            left += [(f"{key}[{i}]", v, depth + 1) for i, v in reversed(list(enumerate(part)))]
+        elif isinstance(part, int | float) and not isinstance(part, bool) and abs(part) > _LARGEST:
+            # Python refuses to write out an integer of thousands of digits.
+            shown = f"a number of {part.bit_length()} bits" if isinstance(part, int) else str(part)
+            return key, shown, f"a number of size {_LARGEST:g} at most"
+    return None
 
 
 Checked = TypeVar("Checked", bound=Data)
@@ -88,7 +98,7 @@ def checked(kind: type[Checked], data: dict[str, Any], where: str) -> Checked:
     """
     large = _too_large(data)
     if large:
-        raise InputError(f"{where}, key {large[0]}", large[1], f"a number of size {_LARGEST:g} at most")
+        raise InputError(f"{where}, key {large[0]}", large[1], large[2])
     try:
         return kind.model_validate(data)
     except ValidationError as error:

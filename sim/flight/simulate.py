@@ -16,6 +16,7 @@ from sim.files.errors import InputError
 from sim.flight import maneuver, orders
 from sim.flight.case import Case
 from sim.flight.commands import compile_programme, law_code
+from sim.flight.plausible import check_lengths, check_revolutions, check_start, check_steepness
 from sim.flight.trim import Trim, self_propulsion
 from sim.kernel.assemble import assemble, weight_across, with_tanks
 from sim.kernel.layout import Model
@@ -136,9 +137,12 @@ def initial_state(case: Case, vehicle: Vehicle, model: Model) -> tuple[Array, Ar
     Raises
     ------
     sim.flight.trim.NoEquilibrium
-        When there is no self-propulsion state.
+        When there is no self-propulsion state within the limits of planes and propeller.
+    InputError
+        For a start that is not in the sea.
     """
     first = case.initial
+    check_start(case, vehicle)
     if first.state == "self_propulsion":
         mixer = mixer_of(vehicle, case.sail_planes)
         limits = plane_limits(vehicle)[0]
@@ -153,6 +157,7 @@ def initial_state(case: Case, vehicle: Vehicle, model: Model) -> tuple[Array, Ar
             _held(case),
             first.upright,
         )
+        check_revolutions(case, vehicle, float(trim.controls[len(vehicle.planes)]))
         return trim.state.copy(), trim.controls.copy(), trim
     state = np.zeros(12)
     state[0], state[8] = first.speed_mps, first.depth_m - model.sail_top
@@ -278,7 +283,7 @@ def waves_of(case: Case) -> Waves:
     Raises
     ------
     InputError
-        When the case asks for a sea state that the table does not have.
+        When the case asks for a sea state that the table does not have, or for waves that would break.
     """
     density, gravity = case.environment.density_kgpm3, case.environment.gravity_mps2
     data = case.waves
@@ -287,11 +292,13 @@ def waves_of(case: Case) -> Waves:
     direction = math.radians(data.direction_deg)
     if data.kind == "regular":
         length = data.length_m or gravity * (data.period_s or 0.0) ** 2 / (2.0 * math.pi)
+        check_steepness(case, data.height_m or 0.0, length)
         return regular(data.height_m or 0.0, length, direction, density, gravity, math.radians(data.phase_deg))
     height, period = data.height_m or 0.0, data.period_s or 0.0
     if data.sea_state is not None:
         nominal = sea_state(data.sea_state)
         height, period = nominal.height, nominal.period
+    check_steepness(case, height, gravity * period**2 / (2.0 * math.pi))
     spectrum = Spectrum(data.kind, height, period, direction, data.spreading, data.gamma)
     return realise(spectrum, data.components, data.seed, density, gravity)
 
@@ -307,6 +314,7 @@ def water_of(case: Case, coefficients: Coefficients) -> Water | None:
         When the vehicle lacks the geometry or the place of the propeller that waves need.
     """
     waves = waves_of(case)
+    check_lengths(case, coefficients.vehicle, waves)
     if not case.environment.free_surface and waves.amplitude.size == 0:
         return None
     dt = case.run.step_s

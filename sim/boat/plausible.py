@@ -1,0 +1,115 @@
+"""Whether the numbers of a vehicle file can be those of a vehicle at all."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sim.files.errors import InputError
+
+if TYPE_CHECKING:
+    from sim.boat.vehicle import Plane, Vehicle
+
+# Cosine between span and chord beyond which a plane has no normal to speak of: 60 degrees apart.
+_ALONG = 0.5
+# Floating boats displace what they weigh; a submerged one differs by what its planes can carry.
+_OUT_OF_TRIM = 0.5
+# Two positions are each other's mirror image when they differ by less than this part of the length.
+_SAME = 1e-3
+
+
+def check_vehicle(vehicle: Vehicle, where: str) -> None:
+    """Refuse numbers that no body has.
+
+    A body's mass is spread over its length: its radii of gyration about the centre of gravity are above
+    zero, below its length, and the square of none exceeds the sum of the others' (the principal moments
+    of inertia of any body: Goldstein, *Classical mechanics*, section 5.3). Whatever is on the boat is no
+    farther from its centre of buoyancy than the boat is long. A plane has a span across its chord, and is
+    the mirror image of the plane that it mirrors.
+
+    Parameters
+    ----------
+    vehicle : As read.
+    where : File, for the message.
+
+    Raises
+    ------
+    InputError
+        Naming the file, the key, what was found and what is allowed.
+    """
+    for key, found, allowed in _faults(vehicle):
+        raise InputError(f"{where}, key {key}", found, allowed)
+
+
+def _faults(vehicle: Vehicle) -> Iterator[tuple[str, str, str]]:
+    yield from _names(vehicle)
+    yield from _mass(vehicle)
+    yield from _places(vehicle)
+    for plane in vehicle.planes:
+        yield from _plane(plane, vehicle)
+
+
+def _names(vehicle: Vehicle) -> Iterator[tuple[str, str, str]]:
+    for name, times in Counter(vehicle.part_names()).items():
+        if times > 1:
+            yield "planes and sections", f"{name!r} {times} times", "a name for each part; not hull, not propeller"
+
+
+def _mass(vehicle: Vehicle) -> Iterator[tuple[str, str, str]]:
+    given, length = vehicle.particulars, vehicle.particulars.length.value
+    radii = np.array(given.radius_of_gyration.value)
+    key = "particulars.radius_of_gyration"
+    if not (radii > 0.0).all() or (radii > length).any():
+        yield key, str(radii.tolist()), f"radii above zero, and not above the length of {length:g} m"
+    square = radii**2
+    if (2.0 * square > square.sum() * (1.0 + 1e-9)).any():
+        text = "radii of a body: the square of none is more than the sum of the others' squares"
+        yield key, str(radii.tolist()), text
+    share = given.displaced_mass.value / given.mass.value
+    if not 1.0 - _OUT_OF_TRIM < share < 1.0 + _OUT_OF_TRIM:
+        yield "particulars.displaced_mass", f"{share:.3g} times the mass", "about the mass: a boat that floats"
+    if not vehicle.propeller.diameter.value < length:
+        yield "propeller.diameter", f"{vehicle.propeller.diameter.value:g} m", f"less than the length of {length:g} m"
+
+
+def _places(vehicle: Vehicle) -> Iterator[tuple[str, str, str]]:
+    given, propeller, tanks = vehicle.particulars, vehicle.propeller, vehicle.tanks
+    places = {
+        "particulars.centre_of_gravity": given.centre_of_gravity.value,
+        "particulars.sail_top": given.sail_top.value,
+        **({"propeller.position": propeller.position.value} if propeller.position else {}),
+        **({"tanks.ballast.position": tanks.ballast.position.value} if tanks else {}),
+        **{f"planes, {p.name}, position": p.position for p in vehicle.planes},
+        **{f"sections, {s.name}, position": s.position for s in (vehicle.sections.centres if vehicle.sections else [])},
+    }
+    length, middle = given.length.value, np.array(given.centre_of_buoyancy.value)
+    for key, place in places.items():
+        away = float(np.linalg.norm(np.array(place) - middle))
+        if away > length:
+            yield key, f"{away:.4g} m from the centre of buoyancy", f"a place on the boat, which is {length:g} m long"
+
+
+def _plane(plane: Plane, vehicle: Vehicle) -> Iterator[tuple[str, str, str]]:
+    key = f"planes, {plane.name}"
+    span, chord = np.array(plane.span_axis), np.array(plane.leading_edge)
+    sizes = float(np.linalg.norm(span)), float(np.linalg.norm(chord))
+    if not min(sizes) > 0.0 or not np.isfinite(sizes).all():
+        yield f"{key}, span_axis and leading_edge", "no direction", "two directions that are not zero"
+        return
+    if abs(float(span / sizes[0] @ (chord / sizes[1]))) > _ALONG:
+        yield (
+            f"{key}, span_axis",
+            f"{plane.span_axis} along the leading edge's {plane.leading_edge}",
+            "a span across it",
+        )
+    if plane.limit_deg > 90.0:
+        yield f"{key}, limit_deg", f"{plane.limit_deg:g}", "90 at most"
+    partner = next(p for p in vehicle.planes if p.name == plane.mirror)
+    if partner.mirror != plane.name:
+        yield f"{key}, mirror", f"{plane.mirror!r}, which mirrors {partner.mirror!r}", "planes that mirror each other"
+    image = np.array(plane.position) * (1.0, -1.0, 1.0)
+    if np.abs(image - partner.position).max() > _SAME * vehicle.particulars.length.value:
+        yield f"{key}, mirror", f"{plane.mirror!r} at {partner.position}", f"the plane at {image.tolist()}"

@@ -1,0 +1,96 @@
+"""Whether a case can happen in water at all."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from sim.files.errors import InputError
+from sim.flight.trim import NoEquilibrium
+
+if TYPE_CHECKING:
+    from sim.boat.vehicle import Vehicle
+    from sim.flight.case import Case
+    from sim.waves.linear import Waves
+
+# Height over length of the steepest wave in deep water (Michell 1893, Philosophical Magazine 36, 430-437).
+_STEEPEST = 0.1418
+# Waves shorter than this part of the boat's length load it no more, and cost memory without bound.
+_SHORTEST = 0.01
+# The deepest place of the sea [m] (GEBCO, Challenger Deep).
+_DEEPEST = 10_935.0
+# Faster than anything that keeps its hull wetted [m/s].
+_FASTEST = 100.0
+
+
+def check_start(case: Case, vehicle: Vehicle) -> None:
+    """Refuse a start that is not in the sea.
+
+    Raises
+    ------
+    InputError
+        For a boat more than its length above the surface or below the sea floor, or faster than 100 m/s.
+    """
+    first, length = case.initial, vehicle.particulars.length.value
+    where = f"case {case.name}, key initial"
+    if not -length <= first.depth_m <= _DEEPEST:
+        allowed = f"a depth of the sail top from {-length:g} m, in the air, to {_DEEPEST:g} m"
+        raise InputError(f"{where}.depth_m", f"{first.depth_m:g} m", allowed)
+    if first.speed_mps > _FASTEST:
+        raise InputError(f"{where}.speed_mps", f"{first.speed_mps:g} m/s", f"{_FASTEST:g} m/s at most")
+
+
+def check_revolutions(case: Case, vehicle: Vehicle, needed: float) -> None:
+    """The propeller's limits hold at the start as in the flight.
+
+    Parameters
+    ----------
+    needed : Revolutions of the self-propulsion state [1/s].
+
+    Raises
+    ------
+    NoEquilibrium
+        When they are beyond the limits.
+    """
+    low, high = case.command.n.limits_rps or vehicle.propeller.limits.value
+    if not low <= needed <= high:
+        at = f"{case.initial.speed_mps:.4g} m/s and D0 = {case.initial.depth_m:.4g} m"
+        limits = f"the propeller's limits are {low:g} to {high:g} 1/s"
+        raise NoEquilibrium(f"self-propulsion at {at} needs {needed:.4g} 1/s; {limits}")
+
+
+def check_steepness(case: Case, height: float, length: float) -> None:
+    """Refuse waves that would break.
+
+    Parameters
+    ----------
+    height, length : From crest to trough and from crest to crest [m]; of a spectrum, the significant
+        height and the length of the wave of the peak period.
+
+    Raises
+    ------
+    InputError
+        For a length of nothing, or waves steeper than any.
+    """
+    where = f"case {case.name}, key waves"
+    if not length > 1e-6:
+        raise InputError(where, f"waves of {length:.3g} m length", "a length or a period of waves of water")
+    if height > _STEEPEST * length:
+        found = f"{height:.4g} m high and {length:.4g} m long: steepness {height / length:.3g}"
+        raise InputError(where, found, f"a steepness of {_STEEPEST:g} at most, at which waves break")
+
+
+def check_lengths(case: Case, vehicle: Vehicle, waves: Waves) -> None:
+    """Refuse waves too short to be resolved along the boat.
+
+    Raises
+    ------
+    InputError
+        For a component shorter than a hundredth of the boat's length.
+    """
+    if waves.number.size == 0:
+        return
+    shortest, least = 2.0 * math.pi / float(waves.number.max()), _SHORTEST * vehicle.particulars.length.value
+    if shortest < least:
+        text = f"waves of {shortest:.3g} m length"
+        raise InputError(f"case {case.name}, key waves", text, f"{least:.3g} m or more, a hundredth of the boat's")
