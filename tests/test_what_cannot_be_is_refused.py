@@ -1,0 +1,193 @@
+"""Authority: bodies, planes, propellers and waves: mechanics of rigid bodies, Michell's steepest wave, the sea's depth.
+
+A file whose numbers no boat and no sea has is refused with its key; limits are limits from the start on;
+a result that is no number is no success.
+"""
+
+from __future__ import annotations
+
+from importlib.resources import files
+
+import pytest
+from click.testing import CliRunner
+
+from ident.calibration.file import load_calibration
+from ident.cli import main
+from ident.validation.bands import fly_samples
+from sim.boat.coefficients import Coefficients
+from sim.boat.vehicle import bundled, load_vehicle
+from sim.files.errors import InputError
+from sim.files.schema import Data, checked
+from sim.flight.case import load_case
+from sim.flight.plausible import check_revolutions, check_start
+from sim.flight.simulate import waves_of
+from sim.flight.trim import NoEquilibrium
+
+
+def written(tmp_path, kind: str, name: str, *edits: tuple[str, str]):
+    text = (files("sim") / kind / f"{name}.toml").read_text("utf-8")
+    for old, new in edits:
+        assert old in text, old
+        text = text.replace(old, new, 1)
+    path = tmp_path / f"{name}.toml"
+    path.write_text(text)
+    return path
+
+
+@pytest.mark.parametrize("name", bundled("vehicles"))
+def test_every_bundled_vehicle_can_be(name):
+    assert load_vehicle(name).name == name
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "key"),
+    [
+        ("value = 70.2,", 'value = "70.2",', "particulars.length.value"),
+        ("mass = { value = 4.440e6", "mass = { value = true", "particulars.mass.value"),
+        ("dV = -1, dH = -1", "dV = false, dH = -1", "mixer.dV"),
+        ("[3.433, 17.6, 17.522]", "[-3.433, 17.6, 17.522]", "radius_of_gyration"),
+        ("[3.433, 17.6, 17.522]", "[3.433, 17.6, 11.0]", "radius_of_gyration"),
+        ("[3.433, 17.6, 17.522]", "[3.433, 1760.0, 1752.2]", "radius_of_gyration"),
+        ("mass = { value = 4.440e6", "mass = { value = 4.440e5", "displaced_mass"),
+        ("diameter = { value = 5.0", "diameter = { value = 500.0", "propeller.diameter"),
+        ("centre_of_gravity = { value = [0.0", "centre_of_gravity = { value = [100.0", "centre_of_gravity"),
+        ("position = [31.1794, 3.9057, -3.9057]", "position = [311.794, 3.9057, -3.9057]", "stern_plane_1, position"),
+        ("position = [31.1794, 3.9057, -3.9057]", "position = [31.1794, 3.9057, 3.9057]", "stern_plane_1, mirror"),
+        ('mirror = "stern_plane_4"', 'mirror = "stern_plane_2"', "stern_plane_1, mirror"),
+        ("span_axis = [0, 1, -1]", "span_axis = [1, 0, 0]", "stern_plane_1, span_axis"),
+        ("span_axis = [0, 1, -1]", "span_axis = [0, 0, 0]", "stern_plane_1, span_axis"),
+        ("leading_edge = [-1, 0, 0]", "leading_edge = [0, 1, -1]", "stern_plane_1, span_axis"),
+        ("limit_deg = 30.0", "limit_deg = 3000.0", "stern_plane_1, limit_deg"),
+        ('name = "Hull 2"', 'name = "Hull 1"', "planes and sections"),
+    ],
+)
+def test_a_vehicle_that_no_body_is_like_is_refused(tmp_path, old, new, key):
+    with pytest.raises(InputError) as caught:
+        load_vehicle(written(tmp_path, "vehicles", "bb2", (old, new)))
+    assert key in caught.value.where, caught.value
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ('name = "Hull 1"', 'name = "H1"'),
+        ('term_set = "reduced"', 'term_set = "gertler_hagen"'),
+        ('name = "sail_planes"\n', 'name = "bow_planes"\n'),
+    ],
+)
+def test_coefficients_of_parts_that_the_vehicle_lacks_are_not_dropped(tmp_path, rows, old, new):
+    edits = [(old, new)] + ([('mirror = "sail_planes"', 'mirror = "bow_planes"')] if "bow" in new else [])
+    vehicle = load_vehicle(written(tmp_path, "vehicles", "bb2", *edits))
+    with pytest.raises(InputError, match="vehicle bb2"):
+        Coefficients(vehicle, rows)
+
+
+@pytest.mark.parametrize("limits", [[0.01, 0.02], [-5.0, -1.0]])
+def test_a_self_propulsion_state_beyond_the_propeller_is_none(tmp_path, limits):
+    vehicle = load_vehicle(written(tmp_path, "vehicles", "bb2", ("[0.01, 10.0]", str(limits))))
+    case = load_case("self-propulsion")[0]
+    with pytest.raises(NoEquilibrium, match="the propeller's limits"):
+        check_revolutions(case, vehicle, 1.18)
+    check_revolutions(case, load_vehicle("bb2"), 1.18)
+
+
+@pytest.mark.parametrize(
+    ("key", "value"), [("depth_m", 2e4), ("depth_m", -1e9), ("depth_m", -71.0), ("speed_mps", 3000.0)]
+)
+def test_a_start_outside_of_the_sea_is_refused(key, value):
+    case = load_case("roll-decay")[0]
+    check_start(case, load_vehicle("bb2"))
+    moved = case.model_copy(update={"initial": case.initial.model_copy(update={key: value})})
+    with pytest.raises(InputError, match=f"initial.{key}"):
+        check_start(moved, load_vehicle("bb2"))
+
+
+@pytest.mark.parametrize(
+    ("waves", "stands"),
+    [
+        ({"height_m": 100.0, "period_s": 8.0}, False),
+        ({"height_m": 14.2, "length_m": 100.0}, False),
+        ({"height_m": 14.1, "length_m": 100.0}, True),
+        ({"height_m": 0.001, "period_s": 1e-9}, False),
+        ({"height_m": 0.001, "period_s": 1e-300}, False),
+        ({"kind": "jonswap", "height_m": 30.0, "period_s": 8.0}, False),
+    ],
+)
+def test_waves_steeper_than_michells_break(waves, stands):
+    case = load_case("ss5-4m")[0]
+    data = {"kind": "regular", "direction_deg": 180.0, **waves}
+    moved = case.model_copy(update={"waves": type(case.waves).model_validate(data)})
+    if stands:
+        assert waves_of(moved).amplitude.size == 1
+        return
+    with pytest.raises(InputError, match="key waves"):
+        waves_of(moved)
+
+
+def test_waves_of_centimetres_are_refused_before_anything_is_laid_out(coefficients):
+    from sim.flight.simulate import water_of
+
+    case = load_case("ss5-4m")[0]
+    waves = {"kind": "regular", "direction_deg": 180.0, "height_m": 0.001, "period_s": 0.2}
+    moved = case.model_copy(update={"waves": type(case.waves).model_validate(waves)})
+    with pytest.raises(InputError, match="a hundredth of the boat"):
+        water_of(moved, coefficients)
+
+
+@pytest.mark.parametrize("samples", [10**12, 2**63, 10**30])
+def test_samples_that_no_memory_holds_are_refused_before_one_is_drawn(rows, samples):
+    with pytest.raises(InputError, match=r"in .* GB of memory"):
+        fly_samples(load_case("roll-decay")[0], load_vehicle("bb2"), rows, samples)
+
+
+class Anything(Data):
+    x: float = 0.0
+
+
+@pytest.mark.parametrize("number", [10**5000, -(10**5000), 1e300, 2**60], ids=["long", "below", "float", "int"])
+def test_numbers_that_no_file_means_are_named_whatever_their_length(number):
+    with pytest.raises(InputError, match="a number of size 1e"):
+        checked(Anything, {"x": number}, "file.toml")
+
+
+def test_a_file_of_parts_in_parts_is_refused_at_any_depth():
+    data: dict = {"x": 1.0}
+    for _ in range(5000):
+        data = {"a": data}
+    with pytest.raises(InputError, match="parts in parts"):
+        checked(Anything, data, "file.toml")
+
+
+def test_a_multiplier_below_zero_is_refused_when_it_is_read(tmp_path):
+    text = (files("ident") / "calibrations" / "bb2.toml").read_text("utf-8")
+    start = text.index("[[group]]")
+    group = '[[group]]\nname = "a"\ntitle = "a"\nterms = ["N_v"]\n'
+    prior = '[group.prior]\nmethod = "stated"\nmean = -1.0\nsigma = 1.0\nsource = "made"\n'
+    path = tmp_path / "calibration.toml"
+    path.write_text(text[:start] + group + prior)
+    with pytest.raises(InputError, match="a mean above zero"):
+        load_calibration(str(path))
+
+
+def run(*arguments: object):
+    return CliRunner().invoke(main, [str(a) for a in arguments])
+
+
+def test_an_empty_name_of_a_case_is_no_case(tmp_path, fitted_db):
+    done = run("validate", "--case", "", "--db", fitted_db, "--out", tmp_path / "out")
+    assert (done.exit_code, "empty" in done.output) == (2, True)
+    assert not (tmp_path / "out").exists()
+
+
+def test_speeds_that_overflow_are_refused(fitted_db):
+    done = run("stability", "--db", fitted_db, "--speed", "1e155")
+    assert (done.exit_code, type(done.exception)) == (2, SystemExit)
+
+
+def test_a_depth_change_without_a_change_has_no_metrics_and_no_success(tmp_path, fitted_db):
+    text = (files("sim") / "cases" / "depth-change.toml").read_text("utf-8")
+    path = tmp_path / "case.toml"
+    path.write_text("\n".join(line for line in text.splitlines() if not line.startswith("distance_m")))
+    done = run("validate", "--case", path, "--db", fitted_db, "--out", tmp_path / "out")
+    assert (done.exit_code, type(done.exception)) == (2, SystemExit), done.output
+    assert "nan" not in done.output.lower().split("found:")[0]
