@@ -184,10 +184,22 @@ def test_speeds_that_overflow_are_refused(fitted_db):
     assert (done.exit_code, type(done.exception)) == (2, SystemExit)
 
 
-def test_a_depth_change_without_a_change_has_no_metrics_and_no_success(tmp_path, fitted_db):
+def test_a_depth_change_without_a_change_is_refused(tmp_path):
+    """Its metrics are shares of the change."""
     text = (files("sim") / "cases" / "depth-change.toml").read_text("utf-8")
     path = tmp_path / "case.toml"
     path.write_text("\n".join(line for line in text.splitlines() if not line.startswith("distance_m")))
-    done = run("validate", "--case", path, "--db", fitted_db, "--out", tmp_path / "out")
-    assert (done.exit_code, type(done.exception)) == (2, SystemExit), done.output
-    assert "nan" not in done.output.lower().split("found:")[0]
+    with pytest.raises(InputError, match="distance_m"):
+        load_case(path)
+
+
+@pytest.mark.parametrize("number", [float("nan"), float("inf")])
+def test_a_result_that_is_no_number_is_no_success(tmp_path, number):
+    from ident.commands.shared import emit
+    from ident.validation.validate import _check_numbers
+
+    with pytest.raises(InputError, match="not finite"):
+        emit({"x": number}, str(tmp_path / "x.json"))
+    assert not (tmp_path / "x.json").exists()
+    with pytest.raises(InputError, match="metric overshoot_m"):
+        _check_numbers({"overshoot_m": {"simulated": number, "CFD": None}}, "case.toml")

@@ -311,6 +311,13 @@ class Case(Data):
     tolerance: list[Tolerance] = Field(default_factory=list)
 
     @model_validator(mode="after")
+    def _changes_depth_by_something(self) -> Case:
+        steps = self.command.dV.step
+        if self.maneuver == "depth_change" and not (steps and steps[-1].distance_m):
+            raise ValueError("a depth_change whose last step of dV has a distance_m that is not zero")
+        return self
+
+    @model_validator(mode="after")
     def _starts_below_the_surface(self) -> Case:
         starts: list[Initial | Start] = [self.initial, *(self.reference.initial.values() if self.reference else [])]
         depths = [s.depth_m for s in starts if s.depth_m is not None] + (self.sweep.depth_m if self.sweep else [])
