@@ -4,14 +4,11 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 
 from sim.files.errors import InputError
-
-if TYPE_CHECKING:
-    from sim.boat.vehicle import Plane, Vehicle
 
 # Cosine between span and chord beyond which a plane has no normal to speak of: 60 degrees apart.
 _ALONG = 0.5
@@ -21,7 +18,7 @@ _OUT_OF_TRIM = 0.5
 _SAME = 1e-3
 
 
-def check_vehicle(vehicle: Vehicle, where: str) -> None:
+def check_vehicle(vehicle: Any, where: str) -> None:
     """Refuse numbers that no body has.
 
     A body's mass is spread over its length: its radii of gyration about the centre of gravity are above
@@ -32,7 +29,7 @@ def check_vehicle(vehicle: Vehicle, where: str) -> None:
 
     Parameters
     ----------
-    vehicle : As read.
+    vehicle : A ``sim.boat.vehicle.Vehicle``, as read.
     where : File, for the message.
 
     Raises
@@ -44,7 +41,7 @@ def check_vehicle(vehicle: Vehicle, where: str) -> None:
         raise InputError(f"{where}, key {key}", found, allowed)
 
 
-def _faults(vehicle: Vehicle) -> Iterator[tuple[str, str, str]]:
+def _faults(vehicle: Any) -> Iterator[tuple[str, str, str]]:
     yield from _names(vehicle)
     yield from _mass(vehicle)
     yield from _places(vehicle)
@@ -52,13 +49,13 @@ def _faults(vehicle: Vehicle) -> Iterator[tuple[str, str, str]]:
         yield from _plane(plane, vehicle)
 
 
-def _names(vehicle: Vehicle) -> Iterator[tuple[str, str, str]]:
+def _names(vehicle: Any) -> Iterator[tuple[str, str, str]]:
     for name, times in Counter(vehicle.part_names()).items():
         if times > 1:
             yield "planes and sections", f"{name!r} {times} times", "a name for each part; not hull, not propeller"
 
 
-def _mass(vehicle: Vehicle) -> Iterator[tuple[str, str, str]]:
+def _mass(vehicle: Any) -> Iterator[tuple[str, str, str]]:
     given, length = vehicle.particulars, vehicle.particulars.length.value
     radii = np.array(given.radius_of_gyration.value)
     key = "particulars.radius_of_gyration"
@@ -75,7 +72,7 @@ def _mass(vehicle: Vehicle) -> Iterator[tuple[str, str, str]]:
         yield "propeller.diameter", f"{vehicle.propeller.diameter.value:g} m", f"less than the length of {length:g} m"
 
 
-def _places(vehicle: Vehicle) -> Iterator[tuple[str, str, str]]:
+def _places(vehicle: Any) -> Iterator[tuple[str, str, str]]:
     given, propeller, tanks = vehicle.particulars, vehicle.propeller, vehicle.tanks
     places = {
         "particulars.centre_of_gravity": given.centre_of_gravity.value,
@@ -92,7 +89,7 @@ def _places(vehicle: Vehicle) -> Iterator[tuple[str, str, str]]:
             yield key, f"{away:.4g} m from the centre of buoyancy", f"a place on the boat, which is {length:g} m long"
 
 
-def _plane(plane: Plane, vehicle: Vehicle) -> Iterator[tuple[str, str, str]]:
+def _plane(plane: Any, vehicle: Any) -> Iterator[tuple[str, str, str]]:
     key = f"planes, {plane.name}"
     span, chord = np.array(plane.span_axis), np.array(plane.leading_edge)
     sizes = float(np.linalg.norm(span)), float(np.linalg.norm(chord))
