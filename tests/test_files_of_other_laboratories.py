@@ -92,8 +92,8 @@ def test_tidy_tables_of_the_world(tmp_path, text, keys):
         (PLAIN.replace("beta_deg", "beta [Grad]"), "unit 'Grad' for beta"),
         (PLAIN.replace("beta_deg", "beta [\u00b0]").encode("latin-1"), "latin-1, cp1252, shift_jis"),
         (TABS.encode("utf-16-le"), 'encoding = "utf-16-le"'),
-        (b"PK\x03\x04\x14\x00\x06\x00", "a spreadsheet (xlsx, ods)"),
-        (b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1", "an Excel workbook"),
+        (b"PK\x03\x04\x14\x00\x06\x00", "not a workbook"),
+        (b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1", "not a workbook"),
         (PLAIN.replace("2750.25", "NaN"), "row 2, column Y [N]: 'NaN'"),
         (PLAIN.replace("2750.25", "#N/A"), "row 2, column Y [N]: '#N/A'"),
         ("beta_deg;X [N];Note\n2;1,234;12 345\n", "row 2: '1,234' (allowed: decimal"),
@@ -126,7 +126,7 @@ def test_hyphens_and_raised_digits_of_units(quantity, unit, expected):
 def test_words_in_brackets_are_no_unit_and_a_unit_is_no_word(tmp_path):
     text = PLAIN.replace("X [N]", "Drag (hull)")
     assert_values(read(tmp_path / "a", text, tidy("", '"Drag (hull)" = "X [N]"')))
-    for unit in ("m", "Kn", "KN", "Newton"):
+    for unit in ("m", "Kn", "KN"):
         with pytest.raises(InputError, match=f"unit '{unit}', declared as 'N'"):
             read(tmp_path / "b", text.replace("hull", unit), tidy("", f'"Drag ({unit})" = "X [N]"'))
     with pytest.raises(InputError, match="unit 'hull', declared as 'N'"):

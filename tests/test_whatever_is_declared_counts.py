@@ -299,6 +299,7 @@ SOURCE_CASES: dict[str, tuple[dict[str, Any], dict[str, Any], dict[str, Any]]] =
     "Source.columns": (of(DRIFT), of(DRIFT, columns={"X_N": "Y [N]"}), {}),
     "Source.patterns": (of(DRIFT), of(DRIFT, patterns={"^X": "X"}), {}),
     "Source.ignore": (of(DRIFT), of(DRIFT, ignore=["X*"]), {}),
+    "Source.table": (of(DRIFT), of(DRIFT, table="drift"), {}),
     "Source.names": (of(DRIFT), of(DRIFT, names=["a", "b"]), {}),
     "Source.header_pattern": (of(DRIFT), of(DRIFT, header_pattern="^a", delimiter=","), {}),
     "Source.widths": (of(DRIFT), of(DRIFT, widths=[3, 3]), {}),

@@ -65,6 +65,7 @@ class Campaign:
     digests : SHA-256 of every input file.
     reduced : The time histories that were reduced to runs, for their plots.
     refused : Those that were left out because their time stamps do not rise.
+    members : Name -> campaign of several that were put together (``ident.captive.combine``).
 
     Examples
     --------
@@ -80,6 +81,7 @@ class Campaign:
     digests: dict[str, str] = field(default_factory=dict)
     reduced: tuple[Reduced, ...] = ()
     refused: tuple[NotRising, ...] = ()
+    members: dict[str, Campaign] = field(default_factory=dict)
 
     def _repr_html_(self) -> str:
         groups = self.runs.groupby(["file", "test", "part"], sort=False)
@@ -90,9 +92,9 @@ class Campaign:
 
 @cache
 def tests() -> pd.DataFrame:
-    """Known captive tests by name: stage, required quantities, meaning."""
+    """Known captive tests by name: stage, required quantities, loads without which a boat is none, meaning."""
     with (files("ident") / "data" / "tests.csv").open(encoding="utf-8") as stream:
-        return pd.read_csv(stream).set_index("test")
+        return pd.read_csv(stream, keep_default_na=False).set_index("test")
 
 
 def _digest(path: Path) -> str:
@@ -186,11 +188,12 @@ def _doubtful(runs: pd.DataFrame) -> pd.Series:
 
 def _check_complete(folder: Path, runs: pd.DataFrame, vehicle: Vehicle) -> None:
     """Every run has what its test needs, a load or coefficient, and an error to go with it."""
-    deep = any("D0" in term.axes for term in vehicle_terms(vehicle))
+    # A boat whose coefficients have no axis of depth is asked for none.
+    deep = {test for term in vehicle_terms(vehicle) if "D0" in term.axes for test in term.tests}
     for _, run in runs[_doubtful(runs)].iterrows():
         place = f"{folder / run['file']}, row {run['row']}"
         for need in str(tests().loc[run["test"], "requires"]).split():
-            if need == "D0" and not deep:
+            if need == "D0" and run["test"] not in deep:
                 continue
             quantity = "plane" if need == "delta" else need
             if pd.isna(run.get(quantity, np.nan)):
@@ -255,6 +258,7 @@ def read_campaign(folder: str | os.PathLike[str], leave_out: bool = False, tell:
     histories = (tuple(found.reduced), tuple(found.refused))
     if runs.empty:
         return Campaign(header, vehicle, run_table({}), digests, *histories)
+    runs["run_id"] = _own_names(runs)
     runs["copy_of"] = _originals(folder, runs)
     _check_used(header, runs, where)
     point = frame.vector([header.moment_point.x_m, header.moment_point.y_m, header.moment_point.z_m])
@@ -313,6 +317,14 @@ def _in_program_frame(runs: pd.DataFrame, header: CampaignFile, frame: Frame, wh
     runs = without_hydrostatics(runs, header, frame)
     runs = whole_model(without_inertia(runs, header, frame), header)
     return standard_errors(to_full_scale(runs, ratio), header, ratio * header.scale.length_m)
+
+
+def _own_names(runs: pd.DataFrame) -> pd.Series:
+    """Run names, with their file before those that stand in several files: sheets number their runs anew."""
+    files = runs.groupby("run_id")["file"].transform("nunique")
+    shared = files > 1
+    stem = runs["file"].map(lambda file: Path(str(file)).name.partition(".")[0])
+    return runs["run_id"].where(~shared, stem + "/" + runs["run_id"].astype(str))
 
 
 def _originals(folder: Path, runs: pd.DataFrame) -> pd.Series:

@@ -262,6 +262,8 @@ class CampaignFile(Data):
     half_model : Where only half of the body was tested.
     tables : Files beside the runs that only the checks look at.
     source : Which files hold the runs; every CSV beside this file without.
+    absent : Essential loads that a test does not give, with the reason:
+        ``"drift_horizontal.N" = "a balance of two components"``.
     """
 
     name: str
@@ -278,6 +280,7 @@ class CampaignFile(Data):
     tare: list[Tare] = Field(default_factory=list)
     half_model: HalfModel | None = None
     hydrostatics: Hydrostatics | None = None
+    absent: dict[str, Annotated[str, Field(min_length=1, max_length=500)]] = Field(default_factory=dict)
     tables: Tables = Field(default_factory=Tables)
     source: list[Source] = Field(default_factory=list)
 

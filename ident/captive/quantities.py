@@ -22,6 +22,8 @@ from sim.files.errors import InputError
 # A load, its standard error, and what an oscillatory test is reduced to: mean, then in
 # phase and in quadrature with the displacement, first to third harmonic.
 HARMONICS = ("mean", "in", "out", "in2", "out2", "in3", "out3")
+# The same as an amplitude, and a phase ahead of the displacement's sine or a lag behind it.
+POLAR = tuple(f"{kind}{k}" for k in ("", "2", "3") for kind in ("amp", "phase", "lag"))
 # Before a load: what ``[[source.subtract]]`` took off it.
 TAKEN = "taken_"
 # Dimensionless input needs a named normalisation for these.
@@ -50,6 +52,25 @@ _TIMES = re.compile(
     r"(?i)(^|\s|\()1(0{1,6}|e[+-]?\d)\s*[*·x]?\s*[a-z]{1,2}(?![a-z])"
     r"|[x×*·]\s*(10{1,6}|10\s*(\^|\*\*|e)\s*[-+]?\d+|1e[+-]?\d+)\b"
 )
+# Names of other papers and laboratories -> the quantity that is meant, for the message.
+_MEANT = {
+    **dict.fromkeys(
+        ("delta", "Delta", "DELTA", "δ", "rudder", "Rudder", "RudderAngle", "deltar", "deltas", "deltaR"), "plane"
+    ),
+    **dict.fromkeys(("drift", "Drift", "driftangle", "β", "Beta", "BETA", "leeway", "sideslip"), "beta"),
+    **dict.fromkeys(("incidence", "aoa", "AoA", "AOA", "α", "Alpha", "ALPHA", "pitch", "theta", "trim"), "alpha"),
+    **dict.fromkeys(("R", "radius", "Radius", "Rm"), "R0"),
+    **dict.fromkeys(("V", "speed", "Speed", "velocity", "Vm", "Um"), "U"),
+    **dict.fromkeys(("Fx", "FX", "Drag", "drag", "Resistance"), "X"),
+    **dict.fromkeys(("Fy", "FY", "SideForce", "Fsway"), "Y"),
+    **dict.fromkeys(("Fz", "FZ", "Lift", "lift", "Heave"), "Z"),
+    **dict.fromkeys(("Mx", "MX", "RollMoment"), "K"),
+    **dict.fromkeys(("My", "MY", "PitchMoment"), "M"),
+    **dict.fromkeys(("Mz", "MZ", "YawMoment"), "N"),
+    **dict.fromkeys(("rpm", "RPM", "rps", "RPS", "revs"), "n"),
+    **dict.fromkeys(("Time", "TIME", "t", "flowtime"), "time"),
+    "L/R": "r",
+}
 _NO_UNIT = ("", "-", "1", "/")
 
 
@@ -123,6 +144,8 @@ def owner(quantity: str) -> str:
     for output in (*OUTPUTS, "value"):
         if quantity in (f"s_{output}", f"sigma_{output}", *(f"{output}_{h}" for h in HARMONICS)):
             return output
+        if quantity in {f"{output}_{h}" for h in POLAR}:
+            return output if "_amp" in quantity else "alpha"
     return ""
 
 
@@ -305,9 +328,10 @@ def column(header: str, declared: str | None, where: str, factored: bool = False
     if not known:
         stem = header.rsplit("_", 1)[0]
         like = [c for c in suffixed() if c.rsplit("_", 1)[0] == stem]
-        text = ", ".join(like) or (
-            "a known quantity with its unit, such as U_mps, X_N, K [kN m]; or name it in [source.columns] or ignore"
-        )
+        meant = _MEANT.get(re.sub(r"[^a-zA-Zβαδψ/]", "", split(header)[0]))
+        usual = "a known quantity with its unit, such as U_mps, X_N, K [kN m]; or name it in [source.columns] or ignore"
+        meant = f'{meant}: "{header[:40]}" = "{meant} [...]" in [source.columns]' if meant else ""
+        text = ", ".join(like) or meant or usual
         raise InputError(where, f"unknown column or unit {header[:60]!r}", text)
     quantity = f"s_{known}" if name.startswith("sigma_") else name
     if known in PRIMED and unit is not None and unit in _NO_UNIT and unit != "":

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import re
 from collections.abc import Iterator, Sequence
@@ -20,7 +21,8 @@ from ident.captive.quantities import Column, column, owner, suffixed
 from ident.captive.readers import openfoam
 from ident.captive.readers.opening import matching, open_sheet, reader_of
 from ident.captive.readers.table import Sheet, columns_of, run_blocks
-from ident.captive.readers.text import LARGEST, Dialect
+from ident.captive.readers.text import LARGEST, Dialect, odd
+from ident.captive.readers.times import unit_of
 from ident.captive.run_table import DIRECT, REQUIRED, STATES, TEXT
 from ident.captive.source import NO_COLUMNS, Reduction, Source, idle_keys
 from ident.captive.subtract import off_samples, off_table, taken_columns
@@ -32,6 +34,9 @@ from sim.files.errors import InputError
 _PLAIN = Dialect()
 # By how much of itself a limit of [source.within] is widened.
 _SLACK = 1e-9
+_LEDGER = re.compile(r"\(\s*(\d[\d.,' ]*)\s*\)")
+# Signs and decimal points as file names have them: m08, p08, n4, 04p5, 4,5.
+_IN_NAMES = re.compile(r"(?P<sign>[mpnMPN+-]?)(?P<whole>\d+)(?:[pP,](?P<part>\d+))?")
 _DIGITS = frozenset("0123456789+-.eE")
 
 
@@ -164,14 +169,16 @@ def constants(folder: Path, path: Path, source: Source) -> tuple[dict[str, str],
     InputError
         For a path that does not match, an unknown quantity, or no finite number.
     """
-    where = f"{folder / 'campaign.toml'}, key source.constants"
+    toml = str(folder / "campaign.toml")
+    where = f"{toml}, key source.constants"
     given: dict[str, Any] = dict(source.constants)
     if source.match:
         name = path.relative_to(folder).as_posix()
         found = re.search(source.match, name)
         if not found:
             raise InputError(f"{folder / 'campaign.toml'}, key source.match", f"{name!r} does not match", source.match)
-        given |= {k: v for k, v in found.groupdict().items() if v is not None}
+        named = {k: v for k, v in found.groupdict().items() if v is not None}
+        given |= {k: _of_name(k, v, name[: found.start(k)], toml) for k, v in named.items()}
     words: dict[str, str] = {}
     numbers: dict[str, float] = {}
     primed: set[str] = set()
@@ -192,6 +199,33 @@ def constants(folder: Path, path: Path, source: Source) -> tuple[dict[str, str],
         else:
             raise InputError(place, repr(value[:60]), "a quantity, or one of " + ", ".join(TEXT))
     return words, numbers, primed
+
+
+def signed(quantity: str) -> bool:
+    """Whether a quantity may be below zero."""
+    return quantity not in ("U", "D0", "rel_sigma", "KT", "KQ", "time", "frequency") and not quantity.startswith("s_")
+
+
+def _of_name(key: str, text: str, before: str, where: str) -> str:
+    """A number out of a path with its sign and point as file names write them; other text as it is.
+
+    Raises
+    ------
+    InputError
+        For a mark of a sign right before the digits that the group leaves out.
+    """
+    if key in TEXT or not re.search(r"\d", text):
+        return text
+    quantity = suffixed()[key][0] if key in suffixed() else key
+    mark = re.search(r"(?:^|[^A-Za-z])([mpnMPN])$", before)
+    if mark and text[:1].isdigit() and signed(quantity):
+        found = f"{mark[1]!r} right before {text!r}, outside of the group {key}"
+        raise InputError(f"{where}, key source.match", found, f"(?P<{key}>[mp]?...): m and n are minus, p is plus")
+    hit = _IN_NAMES.fullmatch(text)
+    if hit is None:
+        return text
+    sign = "-" if hit["sign"] in tuple("mMnN-") else ""
+    return f"{sign}{hit['whole']}" + (f".{hit['part']}" if hit["part"] else "")
 
 
 Stated = tuple[dict[str, str], dict[str, float], set[str]]
@@ -241,9 +275,38 @@ def _from_table(
         out = off_table(out, taken, off, source, header, sheet)
     if source.reduction is None:
         return out
+    out = _cartesian(out, where)
     standing = any(out[k].fillna(0.0).ne(0.0).any() for k in ("alpha", "beta") if k in out)
     refuse_tables(source, header, standing, where)
     return _spread(out, source, header, str(path))
+
+
+def _cartesian(table: pd.DataFrame, where: str) -> pd.DataFrame:
+    """Amplitudes and phases of harmonics as parts in phase and in quadrature with the displacement.
+
+    A sin(k w t + phase) = A cos(phase) sin(k w t) + A sin(phase) cos(k w t); a lag is a phase behind.
+
+    Raises
+    ------
+    InputError
+        For an amplitude without one of phase and lag, or beside parts of the same harmonic.
+    """
+    out = table
+    for output, k in itertools.product(OUTPUTS, ("", "2", "3")):
+        names = {kind: f"{output}_{kind}{k}" for kind in ("amp", "phase", "lag", "in", "out")}
+        given = {kind for kind, name in names.items() if name in out}
+        if not given & {"amp", "phase", "lag"}:
+            continue
+        if given not in ({"amp", "phase"}, {"amp", "lag"}):
+            found = " ".join(sorted(names[kind] for kind in given))
+            text = (
+                f"{names['amp']} with one of {names['phase']} (ahead of the displacement) and {names['lag']} (behind)"
+            )
+            raise InputError(f"{where}, key source.columns", found, text)
+        phase = out[names["phase"]] if "phase" in given else -out[names["lag"]]
+        parts = {names["in"]: out[names["amp"]] * np.cos(phase), names["out"]: out[names["amp"]] * np.sin(phase)}
+        out = out.drop(columns=[names[kind] for kind in given]).assign(**parts)
+    return out
 
 
 def _of_values(source: Source) -> tuple[str, float, float]:
@@ -287,13 +350,18 @@ def _numbers(sheet: Sheet, cells: Sequence[str], rows: list[int], kind: Column, 
     if plain is not None and not (signless and (plain < 0.0).any()):
         return np.where(np.isin(plain, list(missing)), np.nan, plain * kind.factor) if missing else plain * kind.factor
     values = np.full(len(cells), np.nan)
+    # Brackets are an accountant's minus in a column that has no other one.
+    ledger = signed(kind.quantity) and not any(c.strip()[:1] in "-\u2212\u2013\uff0d" for c in cells if c.strip())
     for i, cell in enumerate(cells):
         if not cell.strip():
             continue
         value = sheet.dialect.number(cell)
+        if value is None and ledger and (inside := _LEDGER.fullmatch(cell.strip())):
+            value = sheet.dialect.number(inside[1])
+            value = None if value is None else -value
         if value is None:
             place = f"{sheet.path}, row {rows[i]}, column {kind.name[:60]}"
-            raise InputError(place, repr(cell[:60]), f"a finite number of at most {LARGEST:g}, or blank")
+            raise InputError(place, repr(cell[:60]), f"a finite number of at most {LARGEST:g}, or blank{odd(cell)}")
         if value < 0.0 and signless:
             raise InputError(f"{sheet.path}, row {rows[i]}, column {kind.name[:60]}", cell[:60], "zero or more")
         values[i] = np.nan if value in missing else value * kind.factor
@@ -393,14 +461,29 @@ def _channels(
     factors = np.array([to_si(kind) for kind in (*(k for _, k in wanted), *(t.kind for t in taken))])
     channels, matrix = off_samples(names, taken, factors)
 
+    positions = [*(i for i, _ in wanted), *(t.at for t in taken)]
+    at = next((k for k, (_, kind) in enumerate(wanted) if kind.quantity == "time"), -1)
+    clock = wanted[at][0] if at >= 0 else -1
+    if at >= 0 and factors[at] == 1.0:
+        made = _stamps(sheet, positions, clock, at)
+        matrix[at] *= made
+        factors[at] *= made
+
     def pieces() -> Iterator[np.ndarray]:
-        for block in sheet.numbers([*(i for i, _ in wanted), *(t.at for t in taken)]):
+        for block in sheet.numbers(positions, clock):
             yield block @ matrix if taken else block * factors
 
     gaps = {k.quantity: tuple(m * f for m in source.missing) for (_, k), f in zip(wanted, factors, strict=False)}
     others = [c for c in channels if c != "time"]
     moving = moving_body(others, source, header, numbers, source.moments_about or "body", where)
     yield "", Channels(path, channels, pieces, sheet.first_row, gaps, moving)
+
+
+def _stamps(sheet: Sheet, positions: list[int], clock: int, at: int) -> float:
+    """Factor to seconds of a time column said to be in seconds whose stamps cannot be; 1 for others."""
+    block = next(sheet.numbers(positions, clock), None)
+    found = unit_of(float(block[0, at]), float(block[1, at])) if block is not None and len(block) > 1 else None
+    return found[0] if found else 1.0
 
 
 def _no_idle_rule(channels: Channels, rule: Reduction, where: str) -> None:

@@ -3,13 +3,29 @@
 from __future__ import annotations
 
 import re
-from typing import Annotated, Literal
+from typing import Annotated, Literal, get_args
 
 from pydantic import Field, field_validator, model_validator
 
 from sim.files.schema import Data
 
-READERS = ("table", "parquet", "starccm", "columns", "openfoam")
+Reader = Literal[
+    "table",
+    "parquet",
+    "starccm",
+    "columns",
+    "openfoam",
+    "workbook",
+    "matlab",
+    "hdf5",
+    "netcdf",
+    "tdms",
+    "lvm",
+    "fluent",
+    "su2",
+    "tecplot",
+]
+READERS = get_args(Reader)
 # Motion of an oscillatory test -> velocity and acceleration it makes.
 MOTIONS = {
     "surge": ("u", "udot"),
@@ -28,6 +44,15 @@ LOOKED_AT = {
     "starccm": (*_TEXT_KEYS, *_COLUMN_KEYS, "header_pattern", "units_row"),
     "columns": (*_TEXT_KEYS, *_COLUMN_KEYS, "header_pattern", "names", "widths"),
     "parquet": _COLUMN_KEYS,
+    "workbook": (*_COLUMN_KEYS, "table", "header_pattern", "units_row", "skip"),
+    "matlab": (*_COLUMN_KEYS, "table", "names"),
+    "hdf5": (*_COLUMN_KEYS, "table", "names"),
+    "netcdf": (*_COLUMN_KEYS, "table", "names"),
+    "tdms": (*_COLUMN_KEYS, "table"),
+    "lvm": (*_COLUMN_KEYS, "encoding", "skip", "decimal", "thousands"),
+    "fluent": (*_COLUMN_KEYS, *_TEXT_KEYS),
+    "su2": (*_COLUMN_KEYS, *_TEXT_KEYS),
+    "tecplot": (*_COLUMN_KEYS, "table", "encoding", "skip"),
     "openfoam": _FOAM_KEYS,
 }
 NO_COLUMNS = "no subtract: a function object of the patches that are wanted, OpenFOAM's files have no other columns"
@@ -137,6 +162,7 @@ class Source(Data):
     ignore : Headers (with ``*``) to leave out.
     names : Columns in order, of files without a header.
     header_pattern : Regular expression that finds the header line.
+    table : Worksheet, struct, group or zone of a file that holds several.
     widths : Characters of each column, where numbers touch.
     units_row : Whether the row below the header holds the units.
     delimiter : Where it cannot be found out.
@@ -147,14 +173,14 @@ class Source(Data):
     constants : What holds for every run: ``test``, ``part``, ``U = "2 m/s"``.
     within : State -> lowest and highest value whose loads are used.
     match : Regular expression over the path; its named groups are constants.
-    normalisation : Of dimensionless columns: ``half_rho_L2`` or ``half_rho_Ld``.
+    normalisation : Of dimensionless columns: ``half_rho_L2``, ``half_rho_Ld`` or ``half_rho_A``.
     parts : OpenFOAM: function object -> part.
     rho_inf : OpenFOAM: density that the function object used.
     vehicle_origin : OpenFOAM: the vehicle's origin in mesh axes [m].
     cofr : OpenFOAM: the point the moments are about, of files whose header does not name it [m].
     axes : Axes of these files' loads, where they are not as ``[frame]`` says: ``body``, ``flow`` or ``tank``.
     moments_about : A point that moves with the ``body`` or stays ``fixed``, where the body moves in its axes.
-    factor : Header or quantity -> factor that is divided out, where the header does not say it.
+    factor : Header or quantity -> what its values are multiplied by, where the header does not say it.
     missing : Numbers that stand for a value that was not measured.
     words : Words of the files -> those of this program.
     reference : What dimensionless columns were made with.
@@ -163,13 +189,14 @@ class Source(Data):
     """
 
     files: Annotated[str, Field(min_length=1, max_length=300)]
-    reader: Literal["table", "parquet", "starccm", "columns", "openfoam"] | None = None
+    reader: Reader | None = None
     rows: Literal["runs", "history"] = "runs"
     columns: dict[str, str] = Field(default_factory=dict)
     patterns: dict[str, str] = Field(default_factory=dict)
     ignore: list[str] = Field(default_factory=list)
     names: list[str] = Field(default_factory=list)
     header_pattern: str = ""
+    table: Annotated[str, Field(max_length=300)] = ""
     widths: Annotated[list[Annotated[int, Field(ge=1, le=1000)]], Field(max_length=1000)] = Field(default_factory=list)
     units_row: bool = False
     delimiter: Literal["", ",", ";", "\t", " "] = ""

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from ident.captive.published import TEST as PUBLISHED
-from ident.captive.quantities import HARMONICS, Column, owner, split
+from ident.captive.quantities import HARMONICS, POLAR, Column, owner, split
 from ident.captive.run_table import STATES
 from ident.captive.source import Source
 from sim.boat.catalogue import ACCELERATIONS, OUTPUTS
@@ -100,7 +100,7 @@ def refuse_idle_quantities(runs: pd.DataFrame) -> None:
     InputError
         Naming file, row and column, and why nothing would use it.
     """
-    ends = {f"{o}_{h}" for o in OUTPUTS for h in HARMONICS}
+    ends = {f"{o}_{h}" for o in OUTPUTS for h in (*HARMONICS, *POLAR)}
     for name in runs:
         if name in _OF_HISTORIES or name in ends:
             text = "rows = 'history' or [source.reduction] kind = 'oscillatory': a plain run has none"

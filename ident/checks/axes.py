@@ -179,3 +179,11 @@ def _compared(
         far = not 1.0 / rule.limits["factor"] < slope / (base[2] or math.inf) < rule.limits["factor"]
         severity = "error" if far and not known else milder(rule, known)
         yield rule.finding(file, rows_of(group), [output, angle], what, severity)
+
+
+@check("facilities")
+def facilities_apart(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
+    """Campaigns of one boat that differ by more than the errors they state."""
+    for apart in evidence.between:
+        if apart.tau > 0.0 and apart.excess > rule.limits["excess"]:
+            yield rule.finding("campaign.toml", [], [apart.output], apart.words())

@@ -26,6 +26,7 @@ from ident.checks import physics as checks_physics
 from ident.checks import runs as checks_runs
 from ident.checks import tables as checks_tables
 from ident.checks.findings import SEVERITIES, Body, Evidence, Finding, registered, rules
+from ident.checks.summary import counted, cut, lines
 from ident.identification.identify import Identification, identify
 from ident.output import Tell, silent
 from sim.files.errors import InputError
@@ -168,10 +169,33 @@ def check_campaign(
         of derivatives, and identified for it otherwise.
     tell : Told of every check.
     """
+    if campaign.members:
+        return _of_several(campaign, folder, identified or identify(campaign), tell)
     evidence = evidence_of(campaign, folder)
     if campaign.vehicle.term_set != "reduced" and not campaign.runs.empty:
         evidence = replace(evidence, derivatives=constants(identified or identify(campaign)))
     return run(evidence, tell)
+
+
+# What is asked of several campaigns as a whole; the rest is each one's own.
+_TOGETHER = ("missing", "between_tests", "duplicates", "repeated_blocks", "facilities")
+
+
+def _of_several(campaign: Campaign, folder: Path | None, identified: Identification, tell: Tell) -> list[Finding]:
+    """Each campaign by itself, and what only all of them show."""
+    found: list[Finding] = []
+    for name, one in campaign.members.items():
+        own = folder / name if folder is not None and (folder / name).is_dir() else None
+        for finding in check_campaign(one, own, tell=tell):
+            if finding.check != "missing":
+                found.append(replace(finding, file=f"{name}/{finding.file}"))
+    evidence = replace(evidence_of(campaign), histories=(), between=identified.between)
+    known = {(f.check, f.file, f.what) for f in found}
+    with np.errstate(all="ignore"):
+        for name in _TOGETHER:
+            for check in registered()[name]:
+                found += [f for f in check(evidence, rules()[name]) if (f.check, f.file, f.what) not in known]
+    return sorted(found, key=lambda f: -SEVERITIES.index(f.severity))
 
 
 def constants(found: Identification) -> pd.DataFrame:
@@ -221,9 +245,22 @@ def table(findings: Sequence[Finding], title: str) -> Table:
     return shown
 
 
-def show(findings: Sequence[Finding], title: str, console: Console) -> None:
-    """Print the findings, or that there are none."""
-    if findings:
+def show(findings: Sequence[Finding], title: str, console: Console, everything: bool = False) -> None:
+    """Print the findings on one screen, a line a check; or all of them with their remedies.
+
+    Parameters
+    ----------
+    findings : Errors first.
+    title : What was checked.
+    console : Where to print.
+    everything : A table of every finding.
+    """
+    from rich.text import Text
+
+    if everything and findings:
         console.print(table(findings, title))
-    counts = ", ".join(f"{sum(f.severity == s for f in findings)} {s}" for s in reversed(SEVERITIES))
-    console.print(f"quality checks: {counts}", highlight=False)
+    elif findings:
+        console.print(Text(cut(title, console.width), style="bold"))
+        for severity, line in lines(findings, console.width, 18):
+            console.print(Text(line, style=_COLOURS.get(severity, "")), no_wrap=True, overflow="crop")
+    console.print(f"quality checks: {counted(findings)}", highlight=False)

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ident.captive.campaign import Campaign, find_campaigns, read_campaign
+from ident.captive.combine import by_vehicle
 from ident.checks.check import check_campaign
 from ident.checks.findings import SEVERITIES, Finding
 from ident.output import Results, html_table
@@ -74,7 +75,7 @@ def check(folder: str | os.PathLike[str], each: Callable[[str], None] = lambda t
     Returns
     -------
     Results of Checked
-        One a campaign, in folder order.
+        One a vehicle, in folder order: several campaigns of one are looked at together.
 
     Raises
     ------
@@ -88,9 +89,13 @@ def check(folder: str | os.PathLike[str], each: Callable[[str], None] = lambda t
     ...     print(checked.campaign.header.name, [f.check for f in checked.findings if f.severity == "error"])
     my-boat-tank []
     """
-    found = []
-    for path in find_campaigns(Path(folder)):
+    places = find_campaigns(Path(folder))
+    every = []
+    for path in places:
         each(str(path))
-        campaign = read_campaign(path, leave_out=True)
+        every.append(read_campaign(path, leave_out=True))
+    found = []
+    for campaign, path in zip(*by_vehicle(every, places), strict=True):
+        each(str(path))
         found.append(Checked(campaign, tuple(check_campaign(campaign, path))))
     return Results(found)

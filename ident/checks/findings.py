@@ -160,6 +160,7 @@ class Evidence:
     times : File or column name -> time stamps [s].
     histories : Reduced time histories, with their clocks and verdicts.
     tested_length : Length of the body the loads were measured on, at the body's scale [m].
+    between : Error between facilities of each load (``ident.identification.facilities.Between``).
     memo : What two checks share, by name.
     """
 
@@ -174,6 +175,7 @@ class Evidence:
     times: Mapping[str, Array] = field(default_factory=dict)
     histories: tuple[Reduced, ...] = ()
     tested_length: float | None = None
+    between: Sequence[Any] = ()
     memo: dict[str, pd.DataFrame] = field(default_factory=dict, repr=False)
 
 

@@ -12,9 +12,10 @@ from importlib.resources import files
 import numpy as np
 import pandas as pd
 
+from ident.captive.campaign import tests
 from ident.captive.published import TEST as PUBLISHED
 from ident.captive.run_table import PROPULSION
-from ident.checks.findings import Evidence, Finding, Rule, check, rules
+from ident.checks.findings import Evidence, Finding, Rule, check, kept, rules
 from ident.identification.equations import Runs
 from ident.identification.nodes import vanishes
 from ident.identification.solver import Solver
@@ -191,6 +192,34 @@ def configurations(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
     for text in (campaign.vehicle.title, campaign.header.name) if campaign else ():
         if re.search(r"(?i)\bconfig(uration)?\.?[ _-]*\d+", text):
             yield rule.finding("campaign.toml", [], [], f"{text!r} names a configuration by a number")
+
+
+@check("essential")
+def loads_a_boat_needs(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
+    """Tests of the hull whose runs lack the loads that they are made for, as where a column was forgotten."""
+    campaign = evidence.campaign
+    if campaign is None:
+        return
+    terms = vehicle_terms(campaign.vehicle)
+    declared = dict(campaign.header.absent)
+    for test, essential in tests()["essential"].items():
+        runs = campaign.runs[(campaign.runs["test"] == test) & (campaign.runs["part"] == "hull")]
+        runs = runs[~runs["run_id"].astype(str).str.contains(r"[+-][av]$")] if len(runs) else runs
+        wanted = {t.output for t in terms if test in t.tests and t.part == "hull"}
+        for output in str(essential).split():
+            reason = declared.pop(f"{test}.{output}", None)
+            if runs.empty or output not in wanted:
+                continue
+            bare = not kept(runs, output).any()
+            if bare and reason is None:
+                what = f"none of {len(runs)} {test} runs gives {output}: the boat would have no {output} from it"
+                yield rule.finding(str(runs["file"].iloc[0]), [], [output], what)
+            if not bare and reason is not None:
+                what = f"{test}.{output} is declared absent, and {int(kept(runs, output).sum())} runs give it"
+                yield rule.finding("campaign.toml", [], ["absent"], what)
+    for name in declared:
+        known = ", ".join(f"{t}.{o}" for t, loads in tests()["essential"].items() for o in str(loads).split())
+        yield rule.finding("campaign.toml", [], ["absent"], f"{name!r} is declared absent; known are {known}")
 
 
 @check("missing")

@@ -45,7 +45,8 @@ def fit(folder: Path, db: str, message: str, json_path: str | None, force: str, 
 @click.argument("folder", type=click.Path(path_type=Path))
 @json_to("Write the findings as JSON.")
 @click.option("--strict", is_flag=True, help="Exit 1 when a finding is an error.")
-def check(folder: Path, json_path: str | None, strict: bool) -> None:
+@click.option("--all", "everything", is_flag=True, help="Every finding with its remedy, not a line a check.")
+def check(folder: Path, json_path: str | None, strict: bool, everything: bool) -> None:
     """Check the runs of a campaign: copies, slips, outliers, levers, inertia, missing tests.
 
     \b
@@ -58,7 +59,7 @@ def check(folder: Path, json_path: str | None, strict: bool) -> None:
     with console.status("checking") as status:
         found = ident.check(folder, lambda path: status.update(f"checking {on_screen(path)}"))
     for one in found:
-        show(one.findings, f"{one.campaign.header.name}: {len(one.campaign.runs)} runs", console)
+        show(one.findings, f"{one.campaign.header.name}: {len(one.campaign.runs)} runs", console, everything)
     if json_path:
         emit(found.to_dict(), json_path)
     if strict and any(one.counts["error"] for one in found):

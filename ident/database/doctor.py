@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ident.captive.campaign import find_campaigns, read_campaign
+from ident.captive.combine import by_vehicle
 from ident.database.lock import WAIT, held
 from ident.database.store import FOR_EVER, arrow, commit_again, database_rows
 from ident.identification.identify import identify
@@ -158,8 +159,10 @@ def _sources(log: Log, faults: dict[int, str], folders: tuple[Path, ...]) -> Row
                 found[vehicle, content] = (f"version {number}", rows)
     commits = [v for n in faults if (v := _entry(log, n)) is not None and v.digest]
     for folder in folders:
-        for where in find_campaigns(folder):
-            campaign = read_campaign(where, leave_out=True)
+        places = find_campaigns(folder)
+        every = [read_campaign(where, leave_out=True) for where in places]
+        whole, above = by_vehicle(every, places)
+        for where, campaign in dict(zip([*places, *above], [*every, *whole], strict=True)).items():
             same = [v for v in commits if json.loads(v.metadata.get("inputs", "null")) == campaign.digests]
             if not same or campaign.refused:
                 continue

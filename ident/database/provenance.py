@@ -14,6 +14,7 @@ from sim.files.frames import PROGRAM, SENSES
 _TURNED = (*OUTPUTS, *MOTION)
 # Keys of a source that are kept where they are stated.
 _STATED = (
+    "table",
     "axes",
     "moments_about",
     "factor",
@@ -41,6 +42,9 @@ def conversions(campaign: Campaign) -> dict[str, Any]:
     ``fluid``, ``uncertainty``; as in ``campaign.toml``, model scale and campaign frame, with
     how many runs each concerns and which components changed sign.
     """
+    if campaign.members:
+        first, *_ = campaign.members.values()
+        return conversions(first) | {"campaigns": _of_members(campaign)}
     header, runs = campaign.header, campaign.runs
     data = header.model_dump(mode="json")
     frame = header.frame.frame
@@ -73,6 +77,11 @@ def conversions(campaign: Campaign) -> dict[str, Any]:
         "fluid": data["fluid"],
         "uncertainty": data["uncertainty"],
     }
+
+
+def _of_members(campaign: Campaign) -> dict[str, Any]:
+    """Conversions of each of several campaigns, by its name."""
+    return {name: conversions(one) for name, one in campaign.members.items()}
 
 
 def run_sources(campaign: Campaign) -> dict[str, Any]:
@@ -114,6 +123,8 @@ def steps(stored: dict[str, Any]) -> list[tuple[str, str]]:
     """
     if not stored:
         return []
+    if "campaigns" in stored:
+        return [(f"{name}: {step}", text) for name, one in stored["campaigns"].items() for step, text in steps(one)]
     return [
         ("Files", _sources(stored["sources"])),
         *_subtract(stored["sources"]),

@@ -179,7 +179,7 @@ def history_of(simulation: Simulation, vehicle: Vehicle, attributes: Mapping[str
 
 def _sail_top(simulation: Simulation, vehicle: Vehicle) -> Array:
     """(records, 3) place of the sail top in earth axes [m]."""
-    a, b, c = vehicle.particulars.sail_top.value
+    a, b, c = vehicle.needed_sail_top("its place")
     phi, theta, psi = (simulation[k] for k in ("phi", "theta", "psi"))
     # Body to earth, Euler angles 3-2-1: first about x, then y, then z.
     y, z = np.cos(phi) * b - np.sin(phi) * c, np.sin(phi) * b + np.cos(phi) * c

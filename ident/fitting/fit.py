@@ -5,18 +5,18 @@ from __future__ import annotations
 import json
 import os
 from collections import Counter
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ident.captive.campaign import Campaign, find_campaigns, read_campaign
+from ident.captive.combine import by_vehicle
 from ident.checks.check import check_campaign, refuse_errors
-from ident.checks.check import table as findings_table
 from ident.checks.findings import Finding
 from ident.database.lock import WAIT
 from ident.database.provenance import conversions, run_sources
 from ident.database.store import commit, database_rows, digest
-from ident.fitting.notes import group_unused, group_warnings
+from ident.fitting.summary import summary
 from ident.identification.identify import Identification, identify
 from ident.output import Results, Tell, html_table, silent
 from ident.text import on_screen
@@ -81,6 +81,7 @@ class Fit:
             "unused": [dict(zip(_UNUSED, u, strict=True)) for u in self.identification.unused],
             "warnings": [{"subject": s, "message": m} for s, m in self.identification.warnings],
             "checks": [f.as_json() for f in self.findings],
+            "between": [asdict(one) for one in self.identification.between],
         }
 
     def _repr_html_(self) -> str:
@@ -97,21 +98,25 @@ def metadata(
     header = campaign.header
     # A version that was fitted without an error of the checks does not carry the key.
     forced = {"forced": force.strip()} if any(f.severity == "error" for f in findings) else {}
-    return {
-        "campaign": header.name,
-        "facility": header.facility,
-        "provenance": header.provenance.strip(),
-        "frame": f"x {header.frame.x}, y {header.frame.y}, z {header.frame.z}",
-        "inputs": json.dumps(campaign.digests),
-        "conversions": json.dumps(conversions(campaign)),
-        "runs": json.dumps(run_sources(campaign)),
-        "options": json.dumps({"uncertainty": header.uncertainty.model_dump()}),
-        "unused": json.dumps(found.unused),
-        "warnings": json.dumps(found.warnings),
-        "quality": json.dumps({k: q.model_dump() for k, q in header.quality.items()}),
-        "checks": json.dumps([f.as_json() for f in findings]),
-        "message": message,
-    } | forced
+    return (
+        {
+            "campaign": header.name,
+            "facility": header.facility,
+            "provenance": header.provenance.strip(),
+            "frame": f"x {header.frame.x}, y {header.frame.y}, z {header.frame.z}",
+            "inputs": json.dumps(campaign.digests),
+            "conversions": json.dumps(conversions(campaign)),
+            "runs": json.dumps(run_sources(campaign)),
+            "options": json.dumps({"uncertainty": header.uncertainty.model_dump()}),
+            "unused": json.dumps(found.unused),
+            "warnings": json.dumps(found.warnings),
+            "quality": json.dumps({k: q.model_dump() for k, q in header.quality.items()}),
+            "checks": json.dumps([f.as_json() for f in findings]),
+            "message": message,
+        }
+        | forced
+        | ({"between": json.dumps([asdict(one) for one in found.between])} if found.between else {})
+    )
 
 
 def fit(
@@ -141,7 +146,8 @@ def fit(
     Returns
     -------
     Results of Fit
-        One a campaign, in folder order.
+        One a vehicle, in folder order: several campaigns of one are fitted together, with the error
+        between their facilities that they show.
 
     Raises
     ------
@@ -168,12 +174,7 @@ def fit(
     """
     path_of_db = os.fspath(db)
     paths = find_campaigns(Path(folder))
-    read = [read_campaign(path, tell=tell) for path in paths]
-    names = [campaign.vehicle.name for campaign in read]
-    for path, name in zip(paths, names, strict=True):
-        if names.count(name) > 1:
-            text = "one campaign a vehicle: a version replaces all rows of its vehicle"
-            raise InputError(str(path / "campaign.toml"), f"vehicle {name!r} has {names.count(name)} campaigns", text)
+    read, paths = by_vehicle([read_campaign(path, tell=tell) for path in paths], paths)
     identified = [identify(campaign, tell) for campaign in read]
     checked = [check_campaign(*one, tell) for one in zip(read, paths, identified, strict=True)]
     if not force.strip():
@@ -216,55 +217,17 @@ def coefficient_table(rows: pd.DataFrame) -> list[dict[str, Any]]:
 
 
 def show(done: Fit, console: Console) -> None:
-    """Print the fit as tables.
+    """Print the fit on one screen; all of it is in ``to_dict`` and in the version's report.
 
     Parameters
     ----------
     done : The fit.
     console : Where to print.
     """
-    from rich.markup import escape
-    from rich.table import Table
+    from rich.text import Text
 
-    serious = [f for f in done.findings if f.severity != "info"]
-    if serious:
-        console.print(findings_table(serious, f"Quality checks: {len(serious)} of {len(done.findings)} findings"))
-    table = Table(title=on_screen(f"{done.campaign.vehicle.title}: {done.campaign.header.name}"), title_justify="left")
-    for column, justify in (
-        ("coefficient", "left"),
-        ("points", "right"),
-        ("measured", "right"),
-        ("runs", "right"),
-        ("median error", "right"),
-        ("worst residual", "right"),
-        ("quality", "left"),
-    ):
-        table.add_column(column, justify=justify)  # type: ignore[arg-type]
-    factor = {k: q.factor for k, q in done.campaign.header.quality.items()}
-    for row in coefficient_table(done.rows):
-        words = [
-            f"[{'yellow' if factor[q] > 1 else 'green'}]{escape(q)} {n}[/]" for q, n in sorted(row["quality"].items())
-        ]
-        worst = row["worst_residual"]
-        table.add_row(
-            escape(row["coefficient"]),
-            str(row["points"]),
-            str(row["measured"]),
-            str(row["runs"]),
-            "-" if row["median_relative_error"] is None else f"{100 * row['median_relative_error']:.1f} %",
-            f"[red]{worst:.1f} s.e.[/]" if worst > 2 else f"{worst:.1f} s.e." if worst else "-",
-            ", ".join(words),
-        )
-    console.print(table)
-    for warning in group_warnings(done.identification.warnings):
-        console.print(f"[yellow]warning[/] ({warning.count}x) {escape(warning.shown)}", highlight=False)
-    used = {r for n in done.identification.nodes for r in n.runs}
-    total = done.campaign.runs["run_id"]
-    console.print(f"{len(used)} of {len(total)} runs used; loads left out, with the reason:")
-    for left in group_unused(done.identification.unused):
-        outputs = " ".join(dict.fromkeys(o for found in left.runs.values() for o in found))
-        ids = list(left.runs)
-        shown = ", ".join(ids[:4]) + (f", ... {len(ids)} runs" if len(ids) > 4 else "")
-        console.print(f"  {escape(left.file)} {outputs}: {escape(left.reason)} [{escape(shown)}]", highlight=False)
     state = "committed" if done.new else "unchanged, nothing committed: already"
-    console.print(f"[bold]{state} version {done.version}[/]  digest {done.digest[:16]}", highlight=False)
+    last = f"{state} version {done.version}  digest {done.digest[:16]}"
+    own = (done.identification, done.rows, done.findings, coefficient_table(done.rows))
+    for style, line in summary(*own, last, console.width):
+        console.print(Text(on_screen(line), style=style), no_wrap=True, overflow="crop")

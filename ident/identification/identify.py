@@ -13,7 +13,7 @@ everything found so far is carried through each subtraction.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from ident.captive.campaign import Campaign, tests
 from ident.identification.equations import Runs
+from ident.identification.facilities import Between, Left, between, together, widened
 from ident.identification.nodes import Node, by_coefficient, table_points
 from ident.identification.solver import Solver, check_levers
 from ident.identification.wake import wake_fraction
@@ -44,6 +45,7 @@ class Identification:
     covariance : (n, n) of ``values``.
     unused : (run_id, file, row, output, reason) for every load that was not used.
     warnings : (run_id or coefficient, message).
+    between : Error between facilities of each load, where several campaigns give it.
     """
 
     campaign: Campaign
@@ -52,6 +54,7 @@ class Identification:
     covariance: Array
     unused: list[tuple[str, str, int, str, str]]
     warnings: list[tuple[str, str]]
+    between: tuple[Between, ...] = ()
 
     @cached_property
     def _members(self) -> dict[tuple[str, str], list[int]]:
@@ -85,6 +88,9 @@ def _propulsion_point(solver: Solver, runs: pd.DataFrame) -> None:
 def identify(campaign: Campaign, tell: Tell = silent) -> Identification:
     """Every coefficient the campaign supports, with covariance.
 
+    Several campaigns of one boat that were put together are fitted twice: the second time with the
+    error between facilities that the first one shows (``ident.identification.facilities``).
+
     Parameters
     ----------
     campaign : From ``read_campaign``.
@@ -94,6 +100,18 @@ def identify(campaign: Campaign, tell: Tell = silent) -> Identification:
     -------
     Identification; runs that could not be used are listed with the reason.
     """
+    if not campaign.members:
+        return _identify(campaign, tell)[0]
+    found, left = _identify(campaign, tell)
+    apart = between(left, campaign.runs["campaign"].tolist())
+    if any(one.tau > 0.0 for one in apart):
+        found, _ = _identify(replace(campaign, runs=widened(campaign.runs, left, apart)), tell)
+        found = replace(found, campaign=campaign)
+    return replace(found, between=tuple(apart))
+
+
+def _identify(campaign: Campaign, tell: Tell) -> tuple[Identification, Left]:
+    """One pass through all stages, and what it leaves of the loads of several campaigns."""
     solver = Solver(campaign)
     check_levers(solver)
     stages = tests()["stage"]
@@ -108,4 +126,5 @@ def identify(campaign: Campaign, tell: Tell = silent) -> Identification:
         solver.tables.clear()
         _propulsion_point(solver, campaign.runs.iloc[rows])
     tell("identifying", len(at), len(at))
-    return Identification(campaign, solver.nodes, solver.values, solver.covariance, solver.unused, solver.warnings)
+    found = Identification(campaign, solver.nodes, solver.values, solver.covariance, solver.unused, solver.warnings)
+    return found, together(solver.left)

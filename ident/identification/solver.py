@@ -15,6 +15,7 @@ from ident.captive.campaign import Campaign
 from ident.captive.published import TEST as PUBLISHED
 from ident.captive.run_table import MEASURED
 from ident.identification.equations import ALWAYS, BEYOND, NONZERO, Equations, Form, Note, Runs
+from ident.identification.facilities import Left
 from ident.identification.nodes import Node, by_coefficient, key_point, table_points
 from ident.identification.stage_solve import solve_stage
 from sim.boat.catalogue import ACCELERATIONS, OUTPUTS, Term
@@ -54,10 +55,12 @@ class Solver:
         self.covariance: Array = np.zeros((0, 0))
         self._members: tuple[int, dict[Key, list[int]]] = (0, {})
         self.tables: dict[Key, tuple[Table, list[int], list[int]]] = {}
+        # What each stage leaves of its loads, kept where several campaigns are compared.
+        self.left: list[Left] = []
         self.unused: list[tuple[str, str, int, str, str]] = []
         self.warnings: list[tuple[str, str]] = []
         particulars, fluid = self.vehicle.particulars, campaign.header.fluid
-        self.diameter = self.vehicle.propeller.diameter.value
+        self.diameter = self.vehicle.diameter
         self.scales = {
             t.name: t.scale(fluid.density_kgpm3, particulars.length.value, self.diameter) for t in self.terms
         }
@@ -270,8 +273,18 @@ class Solver:
             self.warnings.append((bad.name, text))
         self.covariance = np.block([[self.covariance, found.cross.T], [found.cross, found.own]])
         self.values = np.concatenate([self.values, found.values])
+        if self.campaign.members:
+            self.left.append(self._left(equations, found.residual))
         self._record(runs, equations, found.scores(equations.sigma), first)
         self._forget(first, found.lost)
+
+    def _left(self, equations: Equations, residual: Array) -> Left:
+        """What the solution leaves of every load, with the values that it is an equation for."""
+        keys = [" ".join(map(str, sorted(form.unknowns))) for form in equations.forms]
+        outputs = np.array(MEASURED, dtype=object)[equations.output]
+        values = np.array(keys, dtype=object)[equations.form]
+        fitted = equations.value - residual
+        return Left(equations.run, outputs, fitted, residual, equations.sigma, values)
 
     def _record(self, runs: Runs, equations: Equations, scores: Array, first: int) -> None:
         """Enter runs, tests, quality words and the worst disagreement in every node."""

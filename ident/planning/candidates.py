@@ -119,7 +119,8 @@ def campaign_levels(campaign: Campaign) -> dict[str, Levels]:
     found = {}
     for test in planned_tests():
         group = own.get(test, runs)
-        depth = float(group["D0"].max()) if group["D0"].notna().any() else float(runs["D0"].max())
+        depths = group["D0"] if group["D0"].notna().any() else runs["D0"]
+        depth = float(depths.max()) if depths.notna().any() else defaults()["depth"][0] * length
         levels = {"speed_mps": [] if test == "pure_rotation" else [speed], "depth_m": [depth]}
         levels |= {f"{a}_deg": _levels(np.rad2deg(towed[a].abs())) for a in ("alpha", "beta")}
         if test in ("pure_rotation", "rotating_arm", "propeller_side_force"):

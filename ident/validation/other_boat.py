@@ -209,7 +209,7 @@ def saturated(simulation: Simulation, case: Case, vehicle: Vehicle) -> list[dict
         share = float(np.mean(np.abs(simulation[plane.name]) >= math.radians(plane.limit_deg) - 1e-9))
         if share > 0.0:
             found.append({"actuator": plane.name, "limit": plane.limit_deg, "unit": "deg", "share_of_time": share})
-    for limit in case.command.n.limits_rps or vehicle.propeller.limits.value:
+    for limit in case.command.n.limits_rps or vehicle.needed_propeller("a flight").limits.value:
         share = float(np.mean(np.abs(simulation["n"] - limit) <= 1e-9))
         if share > 0.0 and case.command.n.law != "fixed":
             found.append({"actuator": "n", "limit": float(limit), "unit": "1/s", "share_of_time": share})

@@ -51,7 +51,7 @@ def unit_added_masses(coefficients: Coefficients, environment: Environment) -> l
     whole-boat derivatives, as the vehicle declares.
     """
     vehicle = coefficients.vehicle
-    length, diameter = vehicle.particulars.length.value, vehicle.propeller.diameter.value
+    length, diameter = vehicle.particulars.length.value, vehicle.diameter
     found = []
     centres = {s.name: s.position for s in vehicle.sections.centres} if vehicle.sections else {}
     for coefficient in coefficients:

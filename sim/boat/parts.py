@@ -18,14 +18,15 @@ def vehicle_terms(vehicle: Vehicle) -> tuple[Term, ...]:
 
     Whole-boat derivatives of added mass only where the vehicle takes its inertia from them;
     sections only where it has some (they then carry wave loads alone). Terms of planes
-    the vehicle does not have are left out.
+    or of a propeller the vehicle does not have are left out.
     """
     out_of_use = "added mass" if vehicle.added_mass == "sections" else ""
     planes = {p.name for p in vehicle.planes}
+    driven = ("propeller",) if vehicle.propeller else ()
     return tuple(
         t
         for t in catalogue.terms(vehicle.term_set)
-        if t.group != out_of_use and (t.part in ("hull", "propeller", "section") or t.part in planes)
+        if t.group != out_of_use and (t.part in ("hull", "section", *driven) or t.part in planes)
     )
 
 

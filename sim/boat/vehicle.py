@@ -95,7 +95,8 @@ class Particulars(Data):
     radius_of_gyration : About x, y, z through the centre of gravity [m].
     centre_of_gravity : From the body origin [m].
     centre_of_buoyancy : From the body origin [m].
-    sail_top : The point whose depth is D0, from the body origin [m].
+    sail_top : The point whose depth is D0, from the body origin [m]; a bare hull has none until a depth
+        or a flight asks for it.
     """
 
     length: Length
@@ -104,7 +105,7 @@ class Particulars(Data):
     radius_of_gyration: Place
     centre_of_gravity: Place
     centre_of_buoyancy: Place
-    sail_top: Place
+    sail_top: Place | None = None
 
 
 class Propeller(Data):
@@ -258,6 +259,7 @@ class Axes(FrameData):
 class Vehicle(Data):
     """A vehicle file, turned to the program frame by ``load_vehicle``.
 
+    ``propeller`` may be left out of a bare hull: its terms are then out of the set, and flights ask for it.
     ``geometry`` names its surface (``sim.hull.surface``), waves need it; ``errata`` a table of what is
     printed wrong in its source and how it is applied (columns equation, printed, corrected,
     consequence), shown in the report. Both are relative to the vehicle file.
@@ -272,7 +274,7 @@ class Vehicle(Data):
     added_mass : ``derivatives`` of the whole boat, or ``sections`` along it.
     frame : Axes of every vector of the file.
     particulars : Mass, inertia and reference points.
-    propeller : The propeller.
+    propeller : The propeller; a bare hull has none until a flight asks for it.
     planes : Control planes.
     sections : Added-mass sections; with ``added_mass = "sections"``.
     tanks : Ballast and trim tank, where the boat has them.
@@ -287,7 +289,7 @@ class Vehicle(Data):
     added_mass: Literal["sections", "derivatives"]
     frame: Axes
     particulars: Particulars
-    propeller: Propeller
+    propeller: Propeller | None = None
     planes: list[Plane] = Field(default_factory=list)
     sections: Sections | None = None
     tanks: Tanks | None = None
@@ -313,11 +315,12 @@ class Vehicle(Data):
 
         data["frame"].update(x=frame.x, y=frame.y, z=frame.z)
         for key in ("centre_of_gravity", "centre_of_buoyancy", "sail_top"):
-            data["particulars"][key]["value"] = turn(data["particulars"][key]["value"])
+            if data["particulars"][key]:
+                data["particulars"][key]["value"] = turn(data["particulars"][key]["value"])
         if data["tanks"]:
             tank = data["tanks"]["ballast"]["position"]
             tank["value"] = turn(tank["value"])
-        if data["propeller"]["position"]:
+        if data["propeller"] and data["propeller"]["position"]:
             data["propeller"]["position"]["value"] = turn(data["propeller"]["position"]["value"])
         for plane in data["planes"]:
             for key in ("position", "span_axis", "leading_edge"):
@@ -329,7 +332,39 @@ class Vehicle(Data):
     def part_names(self) -> list[str]:
         """Every part of the boat that a run may carry loads of."""
         sections = [s.name for s in self.sections.centres] if self.sections else []
-        return ["hull", "propeller", *[p.name for p in self.planes], *sections]
+        driven = ["propeller"] if self.propeller else []
+        return ["hull", *driven, *[p.name for p in self.planes], *sections]
+
+    @property
+    def diameter(self) -> float:
+        """Propeller diameter [m]; 1 for a boat without one, none of whose terms has it."""
+        return self.propeller.diameter.value if self.propeller else 1.0
+
+    def needed_propeller(self, what: str) -> Propeller:
+        """The propeller, for what cannot be done without one.
+
+        Raises
+        ------
+        InputError
+            When the vehicle file has none.
+        """
+        if self.propeller is None:
+            raise InputError(f"vehicle {self.name}, key propeller", "nothing", f"a propeller: {what} needs it")
+        return self.propeller
+
+    def needed_sail_top(self, what: str) -> list[float]:
+        """Place of the sail top [m], for what cannot be done without it.
+
+        Raises
+        ------
+        InputError
+            When the vehicle file has none.
+        """
+        top = self.particulars.sail_top
+        if top is None:
+            where = f"vehicle {self.name}, key particulars.sail_top"
+            raise InputError(where, "nothing", f"the highest point of boat or sail: {what} needs it")
+        return top.value
 
 
 def bundled(kind: str) -> list[str]:

@@ -193,7 +193,8 @@ def settings_of(case: Case, vehicle: Vehicle, state: Array, controls: Array, tri
     revolutions = float(controls[len(vehicle.planes)])
     commands = (trim.dV, trim.dH) if trim else (0.0, 0.0)
     tank_law, tank_start, tank_gains, tank_limit, tank_rate = _tank_settings(case, vehicle, controls)
-    sail_top = vehicle.particulars.sail_top.value[2]
+    sail_top = vehicle.needed_sail_top("the depth of a flight")[2]
+    propeller = vehicle.needed_propeller("a flight")
     return orders.Settings(
         law=np.array([law_code(dv.law), law_code(dh.law)]),
         value=np.array(value),
@@ -210,8 +211,8 @@ def settings_of(case: Case, vehicle: Vehicle, state: Array, controls: Array, tri
         mixer=mixer_of(vehicle, case.sail_planes),
         plane_limit=limit,
         plane_rate=rate,
-        n_limit=np.array(n.limits_rps or vehicle.propeller.limits.value),
-        n_rate=vehicle.propeller.rate.value,
+        n_limit=np.array(n.limits_rps or propeller.limits.value),
+        n_rate=propeller.rate.value,
         command_limit=np.radians([dv.limit_deg, dh.limit_deg]),
         tank_law=tank_law,
         tank_start=tank_start,

@@ -180,7 +180,7 @@ def main(
         if vehicle.geometry is None:
             raise InputError(f"vehicle {vehicle.name}, key geometry", "nothing", "a geometry file")
         mesh = read_geometry(vehicle.geometry, coarser)
-        top = vehicle.particulars.sail_top.value[2]
+        top = vehicle.needed_sail_top("added mass near the surface")[2]
         table = depth_table(mesh, top, depths, omegas, density, gravity)
     except InputError as error:
         raise click.UsageError(str(error)) from error

@@ -65,6 +65,14 @@ def _slot(coefficient: Coefficient) -> int:
     return layout.OUT_THRUST if coefficient.term.name == "KT" else OUTPUTS.index(coefficient.term.output)
 
 
+def _sail_top(coefficients: Coefficients) -> float:
+    """z of the sail top [m]; asked for where a coefficient has an axis of depth."""
+    vehicle = coefficients.vehicle
+    if vehicle.particulars.sail_top is None and not any("D0" in c.term.axes for c in coefficients):
+        return 0.0
+    return vehicle.needed_sail_top("a coefficient over depth")[2]
+
+
 class _Flat:
     """Lists that become the kernel's arrays."""
 
@@ -72,7 +80,7 @@ class _Flat:
         vehicle = coefficients.vehicle
         self.planes = [p.name for p in vehicle.planes]
         self.one = len(BOAT_FEATURES) + len(PLANE_FEATURES) * len(self.planes)
-        self.scale = (environment.density, vehicle.particulars.length.value, vehicle.propeller.diameter.value)
+        self.scale = (environment.density, vehicle.particulars.length.value, vehicle.diameter)
         self.groups: list[Group] = []
         self.axis: dict[tuple[int, int, bytes], list[int]] = {}
         self.order: dict[tuple[int, int, bytes], int] = {}
@@ -192,8 +200,8 @@ def assemble(coefficients: Coefficients, environment: Environment) -> Model:
         "r_g": particulars.centre_of_gravity.value,
         "r_b": particulars.centre_of_buoyancy.value,
         "inertia": [inertia[i, j] for i, j in _INERTIA],
-        "sail_top": particulars.sail_top.value[2],
-        "diameter": vehicle.propeller.diameter.value,
+        "sail_top": _sail_top(coefficients),
+        "diameter": vehicle.diameter,
         "wake": float(wake.values[0]) if wake else 0.0,
         "mass_matrix": total,
         "added_mass": added,

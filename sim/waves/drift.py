@@ -76,7 +76,7 @@ def make_drift(
     from sim.waves.mean_loads import dipole_body
 
     body = dipole_body(coefficients, environment, free)
-    least = -coefficients.vehicle.particulars.sail_top.value[2]
+    least = -coefficients.vehicle.needed_sail_top("the least depth in waves")[2]
     return tabulate(body, waves, least, top_speed)
 
 

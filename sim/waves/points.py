@@ -44,7 +44,7 @@ def section_masses(coefficients: Coefficients, environment: Environment, volume:
     centres, masses : (s, 3) [m] and c m in x, y, z [kg].
     """
     vehicle = coefficients.vehicle
-    scales = (environment.density, vehicle.particulars.length.value, vehicle.propeller.diameter.value)
+    scales = (environment.density, vehicle.particulars.length.value, vehicle.diameter)
     places = {s.name: k for k, s in enumerate(vehicle.sections.centres)} if vehicle.sections else {}
     masses, whole = np.zeros((len(places), 3)), np.zeros(3)
     for coefficient in coefficients:
@@ -72,7 +72,7 @@ def probes(vehicle: Vehicle) -> Array:
     InputError
         When the vehicle file does not say where the propeller is.
     """
-    position = vehicle.propeller.position
+    position = vehicle.needed_propeller("a boat in waves").position
     if position is None:
         raise InputError(f"vehicle {vehicle.name}, key propeller.position", "nothing", "a position: waves need it")
     return np.array([*[p.position for p in vehicle.planes], position.value], dtype=float)

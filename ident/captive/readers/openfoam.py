@@ -369,4 +369,9 @@ def objects(case: Path) -> dict[str, Path]:
     names = ("forces", "movingForces", "force", "moment")
     if series(root, names):
         return {root.name: root}
-    return {p.name: p for p in sorted(root.iterdir()) if p.is_dir() and series(p, names)}
+    own = {p.name: p for p in sorted(root.iterdir()) if p.is_dir() and series(p, names)}
+    # A case of several regions has a folder for each between.
+    regions = [p for p in sorted(root.iterdir()) if p.is_dir() and p.name not in own and _time(p.name) is None]
+    inside = [(r, p) for r in regions for p in sorted(r.iterdir()) if p.is_dir() and series(p, names)]
+    several = len({r for r, _ in inside}) > 1 or bool(own)
+    return own | {f"{r.name}/{p.name}" if several else p.name: p for r, p in inside}

@@ -7,9 +7,14 @@ import os
 import re
 from pathlib import Path
 
+from ident.captive.readers.hdf5 import open_hdf5, open_netcdf
+from ident.captive.readers.labview import open_lvm, open_tdms
+from ident.captive.readers.matlab import open_matlab
 from ident.captive.readers.parquet import open_parquet
+from ident.captive.readers.solvers import fluent_header, open_fluent, open_plots, open_su2, open_tecplot, plots
+from ident.captive.readers.spreadsheet import open_workbook
 from ident.captive.readers.table import Sheet, open_columns, open_csv
-from ident.captive.readers.text import COMMENTS, head
+from ident.captive.readers.text import COMMENTS, Lines, head, opened, sniff
 from ident.captive.source import Source
 from sim.files.errors import InputError
 
@@ -17,7 +22,34 @@ _LOADS = ("forces", "movingForces", "force", "moment")
 _OUTPUTS = {"forces.dat", "movingForces.dat", "force.dat", "moment.dat", "coefficient.dat", "forceCoeffs.dat"}
 
 
-OPENERS = {"table": open_csv, "starccm": open_csv, "columns": open_columns, "parquet": open_parquet}
+OPENERS = {
+    "table": open_csv,
+    "starccm": open_csv,
+    "columns": open_columns,
+    "parquet": open_parquet,
+    "workbook": open_workbook,
+    "matlab": open_matlab,
+    "hdf5": open_hdf5,
+    "netcdf": open_netcdf,
+    "tdms": open_tdms,
+    "lvm": open_lvm,
+    "fluent": open_fluent,
+    "su2": open_su2,
+    "tecplot": open_tecplot,
+}
+# What a file begins with that says its format.
+_BEGIN = {
+    b"PAR1": "parquet",
+    b"PK\x03\x04": "workbook",
+    b"\xd0\xcf\x11\xe0": "workbook",
+    b"MATLAB": "matlab",
+    b"\x89HDF": "hdf5",
+    b"CDF\x01": "netcdf",
+    b"CDF\x02": "netcdf",
+    b"TDSm": "tdms",
+    b"LabVIEW Measurement": "lvm",
+}
+_ENDINGS = {".parquet": "parquet", ".mat": "matlab", ".nc": "netcdf"}
 
 
 def matching(folder: Path, source: Source) -> list[Path]:
@@ -41,7 +73,8 @@ def matching(folder: Path, source: Source) -> list[Path]:
 def reader_of(path: Path, source: Source) -> str:
     """The format of a file: as declared, else by its content.
 
-    A folder is an OpenFOAM case; ``PAR1`` begins a Parquet file; ``Monitor`` in the header
+    A folder is an OpenFOAM case; workbooks, MATLAB, HDF5, netCDF, TDMS, LVM and Parquet files say it in
+    their first bytes, Fluent, SU2 and Tecplot files in their first lines; ``Monitor`` in the header
     is STAR-CCM+; a header with ``;``, a tab or ``,`` is a table; the rest are columns.
     """
     if source.reader:
@@ -52,17 +85,26 @@ def reader_of(path: Path, source: Source) -> str:
         text = "the case folder, or postProcessing/<function object>: restarts are read together"
         raise InputError(str(path), "one file of an OpenFOAM run", text)
     try:
-        with path.open("rb") as stream:
-            start = stream.read(4)
-    except OSError as error:
-        raise InputError(str(path), f"cannot be read: {error.strerror}", "a readable file") from error
-    if start == b"PAR1" or path.suffix == ".parquet":
-        return "parquet"
+        with opened(path) as stream:
+            start = stream.read(20)
+    except (OSError, EOFError) as error:
+        found = getattr(error, "strerror", None) or str(error)
+        raise InputError(str(path), f"cannot be read: {found}", "a readable file") from error
+    said = next((reader for mark, reader in _BEGIN.items() if start.startswith(mark)), _ENDINGS.get(path.suffix, ""))
+    if said:
+        return "matlab" if said == "hdf5" and path.suffix == ".mat" else said
     if source.header_pattern and source.delimiter in (",", ";", "\t"):
         return "table"
     if source.names or source.header_pattern:
         return "columns"
-    first = next(iter(head(path, source.encoding, COMMENTS, source.skip).text), "")
+    lines = head(path, source.encoding, COMMENTS, source.skip).text
+    first = next(iter(lines), "")
+    if fluent_header(lines) >= 0:
+        return "fluent"
+    if "Time_Iter" in first and "Inner_Iter" in first:
+        return "su2"
+    if re.match(r"(?i)\s*(TITLE|VARIABLES)\s*=", first):
+        return "tecplot"
     if source.patterns or re.search(r"\bMonitor\b", first):
         return "starccm"
     if first and not re.search(r"[A-Za-z]", re.sub(r"[eEdD][+-]?\d", "", first)):
@@ -83,6 +125,12 @@ def open_sheet(path: Path, source: Source) -> Sheet:
     if reader == "openfoam" or path.is_dir():
         text = "a file; rows = 'history' for an OpenFOAM case; a glob such as 'runs.parquet/*.parquet' for many files"
         raise InputError(str(path), "a folder", text)
+    if reader in ("table", "starccm") and not source.header_pattern:
+        first = head(path, source.encoding, COMMENTS, source.skip)
+        if first.text and first.text[0].count(",") + first.text[0].count(";") + first.text[0].count("\t") >= 3:
+            dialect = sniff(path, Lines(first.rows, first.text), source.delimiter, source.decimal, source.thousands)
+            if plots([dialect.cells(first.text[0], f"{path}, row {first.rows[0]}")]):
+                return open_plots(path, source, dialect)
     return OPENERS[reader](path, source.model_copy(update={"reader": reader}))
 
 

@@ -60,7 +60,7 @@ def open_parquet(path: Path, source: Source) -> Sheet:
         except bad as error:
             raise refused(error) from error
 
-    def values(wanted: list[int]) -> Iterator[Array]:
+    def values(wanted: list[int], clock: int = -1) -> Iterator[Array]:
         for row, batch in batches([names[i] for i in wanted]):
             yield np.stack([_numbers(path, row, header[i], batch.column(names[i])) for i in wanted], axis=1)
 

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from ident.captive.quantities import Column, column, owner, split
 from ident.captive.readers.text import COMMENTS, Dialect, Lines, blocks, decimal_mark, head, numbers, sniff
+from ident.captive.readers.times import Clocks
 from ident.captive.source import Source
 from sim.files.errors import InputError
 
@@ -39,7 +40,8 @@ class Sheet:
     path : The file.
     header_row : Row of the header.
     header : Column headers as they stand there.
-    numbers : Wanted column positions -> blocks (rows, wanted) of finite numbers.
+    numbers : Wanted column positions, and that of the column that may hold clock times -> blocks
+        (rows, wanted) of finite numbers.
     cells : Blocks of (file row, cells as text), for a table of runs.
     dialect : How its numbers are written.
     first_row : Row where the data begin.
@@ -49,7 +51,7 @@ class Sheet:
     path: Path
     header_row: int
     header: list[str]
-    numbers: Callable[[list[int]], Iterator[Array]]
+    numbers: Callable[..., Iterator[Array]]
     cells: Callable[[], Iterator[tuple[int, list[str]]]]
     dialect: Dialect
     first_row: int = 2
@@ -85,7 +87,13 @@ def _blocks(path: Path, source: Source, comments: tuple[str, ...] = COMMENTS) ->
 
 
 def _whole_rows(
-    path: Path, data: Iterator[Lines], dialect: Dialect, wanted: list[int], header: list[str], solver: bool
+    path: Path,
+    data: Iterator[Lines],
+    dialect: Dialect,
+    wanted: list[int],
+    header: list[str],
+    solver: bool,
+    clock: int = -1,
 ) -> Iterator[Array]:
     """Numbers of every row; rows at the end that a run still being written leaves unfinished are left out.
 
@@ -100,6 +108,7 @@ def _whole_rows(
     """
     pending: InputError | None = None
     left = 0
+    times = (clock, Clocks()) if clock >= 0 else None
     for block in data:
         text, cut = block.text, 0
         while cut < len(text) and _unfinished(text[-1 - cut], dialect, wanted, cut == 0 and not block.ended, solver):
@@ -109,7 +118,7 @@ def _whole_rows(
         left += cut
         whole = Lines(block.rows[: len(text) - cut], text[: len(text) - cut])
         if whole.text:
-            yield numbers(path, whole, dialect, wanted, header, _NO_DATA)
+            yield numbers(path, whole, dialect, wanted, header, _NO_DATA, times)
         if cut:
             try:
                 numbers(path, Lines(block.rows[-cut:], text[-cut:]), dialect, wanted, header, _NO_DATA)
@@ -143,8 +152,8 @@ def _text_sheet(path: Path, source: Source, dialect: Dialect, header: list[str],
                 i = next(k for k, row in enumerate(block.rows) if row > skip)
                 yield Lines(block.rows[i:], block.text[i:], block.ended)
 
-    def values(wanted: list[int]) -> Iterator[Array]:
-        yield from _whole_rows(path, data(), dialect, wanted, header, source.reader == "starccm")
+    def values(wanted: list[int], clock: int = -1) -> Iterator[Array]:
+        yield from _whole_rows(path, data(), dialect, wanted, header, source.reader == "starccm", clock)
 
     def cells() -> Iterator[tuple[int, list[str]]]:
         for block in data():
@@ -260,7 +269,9 @@ def open_columns(path: Path, source: Source) -> Sheet:
     )
     for row, line in zip(below.rows, below.text, strict=True):
         cells = dialect.cells(line, f"{path}, row {row}") if dialect.delimiter == " " else line.split(dialect.delimiter)
-        if len(cells) == len(header) and all(dialect.number(c) is not None for c in cells):
+        if len(cells) == len(header) and all(
+            dialect.number(c) is not None or Clocks().seconds(c) is not None for c in cells
+        ):
             lines = Lines([first.rows[max(at, 0)]], [first.text[max(at, 0)]])
             return _text_sheet(path, source, dialect, header, lines, row - 1)
     found = f"no line with {len(header)} numbers in the first {len(first.text)}"
@@ -282,6 +293,10 @@ def _columns_decimal(path: Path, below: Lines, header: list[str], source: Source
 def header_names(line: str) -> list[str]:
     """Column names of a header line: split at tabs or two blanks, else at single blanks."""
     text = line.strip().lstrip("#%!").strip()
+    quoted = re.fullmatch(r'\(?\s*("[^"]*"\s*)+\)?', text)
+    if quoted:
+        # Names of several words in quotes, perhaps in brackets: a report file of Fluent.
+        return [n.strip() for n in re.findall(r'"([^"]*)"', text)]
     wide = [c.strip() for c in re.split(r"\t|\s{2,}", text) if c.strip()]
     if len(wide) > 1:
         return wide

@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 import csv
+import gzip
 import io
 import itertools
 import re
+import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, get_args
+from typing import IO, Any, cast, get_args
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from ident.captive.readers.times import FORMS, Clocks
 from ident.captive.source import Encoding
 from sim.files.errors import InputError
 
@@ -39,9 +42,35 @@ _BINARY = {
     b"\x89HDF": "an HDF5 or MATLAB 7.3 file",
     b"MATLAB 5": "a MATLAB file",
     b"TDSm": "a LabVIEW TDMS file",
+    b"%PDF": "a PDF",
+    b"\xff\xd8\xff": "a JPEG picture",
+    b"\x89PNG": "a PNG picture",
+    b"GIF8": "a GIF picture",
+    b"Rar!": "a RAR archive",
+    b"7z\xbc\xaf": "a 7-Zip archive",
+    b"BZh": "a bzip2 archive",
+    b"\xfd7zXZ": "an xz archive",
+    b"{\\rtf": "an RTF document",
+    b"CDF\x01": "a netCDF file",
+    b"CDF\x02": "a netCDF file",
+    b"SIMPLE  ": "a FITS file",
+    b"OggS": "a sound file",
+    b"RIFF": "a sound or film file",
 }
-# Blanks that tools put between groups of digits, and the minus sign of typesetting.
-_SPELLED = str.maketrans({"\u00a0": " ", "\u202f": " ", "\u2009": " ", "\u2212": "-", "\u2019": "'"})
+# Blanks that tools put between groups of digits, dashes of typesetting for minus, full-width signs and digits.
+_SPELLED = str.maketrans(
+    {
+        **dict.fromkeys("\u00a0\u202f\u2009", " "),
+        **dict.fromkeys("\u2212\u2013\u2010\u2011\ufe63\uff0d", "-"),
+        "\u2019": "'",
+        "\uff0b": "+",
+        "\uff0e": ".",
+        "\uff0c": ",",
+        **{chr(0xFF10 + i): str(i) for i in range(10)},
+    }
+)
+# A minus behind the number, as ledgers print it; (8.0) of accountants is read by ``bracketed``.
+_BEHIND = re.compile(r"(\d[\d.,' ]*(?:[eEdD][+-]?\d{1,3})?)-")
 # What a row without any cell is made of: spreadsheets write their empty rows so; DOS ends with ctrl-Z.
 _EMPTY = ' \t\r\f\v,;"\x1a'
 
@@ -62,13 +91,20 @@ class Lines:
     ended: bool = True
 
 
+def opened(path: Path) -> IO[bytes]:
+    """A file to read, unpacked where it is a gzip archive."""
+    with path.open("rb") as stream:
+        packed = stream.read(2) == b"\x1f\x8b"
+    return cast(IO[bytes], gzip.open(path, "rb")) if packed else path.open("rb")
+
+
 def _decoded(path: Path, encoding: str) -> Iterator[str]:
     """The text of a file, a megabyte at a time."""
     import codecs
 
     at = 0
     try:
-        with path.open("rb") as stream:
+        with opened(path) as stream:
             start = stream.read(8)
             stream.seek(0)
             kind = next((k for mark, k in _BINARY.items() if start.startswith(mark)), None)
@@ -92,8 +128,9 @@ def _decoded(path: Path, encoding: str) -> Iterator[str]:
                 yield decoder.decode(b"", final=True)
             except UnicodeDecodeError as error:
                 raise InputError(f"{path}, last byte", f"not {marked} text", "text that is not cut short") from error
-    except OSError as error:
-        raise InputError(str(path), f"cannot be read: {error.strerror}", "a readable file") from error
+    except (OSError, EOFError, zlib.error) as error:
+        found = getattr(error, "strerror", None) or str(error)
+        raise InputError(str(path), f"cannot be read: {found}", "a readable file") from error
 
 
 def blocks(
@@ -177,6 +214,9 @@ class Dialect:
         if self.delimiter == " ":
             return line.split()
         try:
+            if '"' in line:
+                # SU2 pads its quoted names with blanks up to the delimiter.
+                line = re.sub(rf'"[ ]+(?={re.escape(self.delimiter)}|$)', '"', line)
             found = next(csv.reader([line], delimiter=self.delimiter, strict=True, skipinitialspace=True))
         except csv.Error as error:
             raise InputError(where, f"not a row of cells: {error}", "quotes that are closed in the same row") from error
@@ -185,6 +225,8 @@ class Dialect:
     def number(self, cell: str) -> float | None:
         """A cell as a number, or None when it is not a finite one of at most ``LARGEST``."""
         text = (cell if cell.isascii() else cell.translate(_SPELLED)).strip()
+        if text[-1:] == "-" and (behind := _BEHIND.fullmatch(text)):
+            text = f"-{behind[1]}"
         if self.thousands and self.thousands in text:
             group, mark = re.escape(self.thousands), re.escape(self.decimal)
             if not re.fullmatch(rf"[+-]?\d{{1,3}}({group}\d{{3}})+({mark}\d*)?", text, re.ASCII):
@@ -259,7 +301,18 @@ def decimal_mark(path: Path, cells: list[tuple[int, str]], both: str | None, tho
     return ","
 
 
-def numbers(path: Path, block: Lines, dialect: Dialect, wanted: list[int], names: list[str], hint: str = "") -> Array:
+Clock = tuple[int, Clocks] | None
+
+
+def numbers(
+    path: Path,
+    block: Lines,
+    dialect: Dialect,
+    wanted: list[int],
+    names: list[str],
+    hint: str = "",
+    clock: Clock = None,
+) -> Array:
     """The wanted columns of some rows as finite numbers.
 
     Parameters
@@ -270,6 +323,7 @@ def numbers(path: Path, block: Lines, dialect: Dialect, wanted: list[int], names
     wanted : Positions of the columns.
     names : Header of every column, for their number and for the error.
     hint : What more is allowed instead of a row with another number of cells.
+    clock : Position of the column that may hold clock times, and what reads them.
 
     Returns
     -------
@@ -300,10 +354,23 @@ def numbers(path: Path, block: Lines, dialect: Dialect, wanted: list[int], names
             values = frame[wanted].to_numpy(dtype=float)
             if np.isfinite(values).all() and np.abs(values).max(initial=0.0) <= LARGEST:
                 return values
-    return _one_by_one(path, block, dialect, wanted, names, hint)
+    return _one_by_one(path, block, dialect, wanted, names, hint, clock)
 
 
-def _one_by_one(path: Path, block: Lines, dialect: Dialect, wanted: list[int], names: list[str], hint: str) -> Array:
+def odd(cell: str) -> str:
+    """What to do with a cell that holds a number and something else; empty for other cells."""
+    if re.search(r"\d\s*(±|\+/?-|\+\u2212)\s*\d", cell):
+        return "; the number after the sign in a column sigma_... of its own, as one standard error"
+    if re.search(r"\d\s*[*\u2020\u2021\u00a7#a-d]$", cell):
+        return "; a footnote mark: take it off, and give the run the quality word or the exclude that it stands for"
+    if re.fullmatch(r"\(\s*\d[\d.,]*\s*\)", cell):
+        return "; a number in brackets may be negative or doubtful: write it with its sign"
+    return ""
+
+
+def _one_by_one(
+    path: Path, block: Lines, dialect: Dialect, wanted: list[int], names: list[str], hint: str, clock: Clock
+) -> Array:
     """The same cell by cell, to read what pandas does not and to name the cell that fails."""
     values = np.empty((len(block.text), len(wanted)))
     for i, (row, line) in enumerate(zip(block.rows, block.text, strict=True)):
@@ -314,9 +381,13 @@ def _one_by_one(path: Path, block: Lines, dialect: Dialect, wanted: list[int], n
             raise InputError(f"{path}, row {row}", f"{len(cells)} cells", f"{len(names)} cells, as in the header{hint}")
         for j, column in enumerate(wanted):
             value = dialect.number(cells[column])
+            timed = clock is not None and clock[0] == column
+            if value is None and timed and clock is not None:
+                value = clock[1].seconds(cells[column])
             if value is None:
                 place = f"{path}, row {row}, column {names[column][:60]}"
                 found = repr(cells[column][:60]) if cells[column] else "nothing"
-                raise InputError(place, found, f"a finite number of at most {LARGEST:g}")
+                more = f"seconds, {FORMS}; or rate_hz in [source.reduction] and the column in ignore" if timed else ""
+                raise InputError(place, found, more or f"a finite number of at most {LARGEST:g}{odd(cells[column])}")
             values[i, j] = value
     return values

@@ -1,0 +1,134 @@
+"""Named columns from a file of arrays (a workbook, MATLAB, HDF5, netCDF, TDMS) as a ``Sheet``."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ident.captive.quantities import owner, split, suffixed
+from ident.captive.readers.table import Sheet, once
+from ident.captive.readers.text import LARGEST, Dialect
+from ident.captive.readers.times import Clocks
+from ident.captive.source import Source
+from sim.files.errors import InputError
+
+Array = NDArray[np.float64]
+_PLAIN = Dialect()
+# Rows handed on at once.
+_BLOCK = 1 << 14
+
+
+def needs(module: str, extra: str, path: Path, kind: str) -> Any:
+    """A library that reads a format, imported when it is needed.
+
+    Raises
+    ------
+    InputError
+        Naming the extra that installs it.
+    """
+    try:
+        return importlib.import_module(module)
+    except ImportError as error:
+        text = f"pip install 'ident-submarine[{extra}]', or the table saved as CSV or Parquet"
+        raise InputError(str(path), f"{kind}, which needs the package {module.split('.')[0]}", text) from error
+
+
+def with_units(names: Sequence[str], units: Sequence[str], source: Source) -> list[str]:
+    """Names with the unit that the file stores beside them in brackets, where the name has none of its own."""
+    declared = {*source.columns, *(name for one in source.subtract for name in one.columns)}
+    found = []
+    for name, unit in zip(names, units, strict=True):
+        bare = split(name)[1] is None and name not in suffixed() and (name in declared or owner(name.rstrip("'")))
+        found.append(f"{name} [{unit.strip()}]" if bare and unit.strip() else name)
+    return found
+
+
+def chosen(path: Path, found: Sequence[str], source: Source, what: str) -> str:
+    """Which table (worksheet, group, variable) of a file to read.
+
+    Raises
+    ------
+    InputError
+        For a name that is not there, or several tables and none named.
+    """
+    if source.table:
+        if source.table not in found:
+            shown = ", ".join(map(repr, found))[:200]
+            raise InputError(f"{path}, key source.table", f"no {what} {source.table!r}", shown or "none is there")
+        return source.table
+    if len(found) != 1:
+        text = f"table = '...' in [[source]]: one of {', '.join(map(repr, found))[:200]}" if found else f"a {what}"
+        raise InputError(str(path), f"{len(found)} {what}s with columns", text)
+    return found[0]
+
+
+def array_sheet(path: Path, names: Sequence[str], columns: Sequence[Any], source: Source, first_row: int = 1) -> Sheet:
+    """A sheet over columns in memory: arrays of numbers, or lists of cells (numbers, text, blanks).
+
+    Parameters
+    ----------
+    path, source : For the checks.
+    names : Headers.
+    columns : Of equal length.
+    first_row : Row of the first value, for messages.
+    """
+    header = [str(n) for n in names]
+    once(f"{path} (columns)", header, source)
+    length = len(columns[0]) if columns else 0
+
+    def values(wanted: list[int], clock: int = -1) -> Iterator[Array]:
+        clocks = Clocks()
+        for at in range(0, length, _BLOCK):
+            block = [
+                _numbers(path, first_row + at, header[i], columns[i][at : at + _BLOCK], clocks if i == clock else None)
+                for i in wanted
+            ]
+            yield np.stack(block, axis=1)
+
+    def cells() -> Iterator[tuple[int, list[str]]]:
+        for row in range(length):
+            yield first_row + row, [_written(column[row]) for column in columns]
+
+    return Sheet(path, max(first_row - 1, 0), header, values, cells, _PLAIN, first_row)
+
+
+def _written(cell: Any) -> str:
+    if cell is None:
+        return ""
+    if isinstance(cell, bytes):
+        return cell.decode("utf-8", "replace").strip()
+    if isinstance(cell, str):
+        return cell
+    if isinstance(cell, (bool, np.bool_)):
+        return str(bool(cell))
+    if isinstance(cell, (int, float, np.number)):
+        value = float(cell)
+        return "" if np.isnan(value) else repr(int(value)) if value.is_integer() and abs(value) < 1e15 else repr(value)
+    return str(cell)
+
+
+def _numbers(path: Path, row: int, name: str, cells: Any, clocks: Clocks | None) -> Array:
+    """One column of some rows as finite numbers."""
+    if isinstance(cells, np.ndarray) and cells.dtype.kind in "iuf":
+        values = cells.astype(float)
+    else:
+        read = []
+        for cell in cells:
+            text = _written(cell)
+            number = _PLAIN.number(text)
+            if number is None and clocks is not None:
+                number = clocks.seconds(text)
+            read.append(np.nan if number is None else number)
+        values = np.array(read, dtype=float)
+    bad = np.flatnonzero(~(np.abs(values) <= LARGEST))
+    if bad.size:
+        at = int(bad[0])
+        place = f"{path}, row {row + at}, column {name[:60]}"
+        shown = _written(cells[at]) or "nothing"
+        raise InputError(place, repr(shown[:60]), f"a finite number of at most {LARGEST:g}")
+    return values

@@ -1,0 +1,84 @@
+"""LabVIEW: TDMS by the library nptdms, and the text files LVM."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+
+from ident.captive.readers.arrays import array_sheet, chosen, needs, with_units
+from ident.captive.readers.table import Sheet, open_csv
+from ident.captive.readers.text import head
+from ident.captive.source import Source
+from sim.files.errors import InputError
+
+_END = "***End_of_Header***"
+
+
+def open_tdms(path: Path, source: Source) -> Sheet:
+    """The channels of one group; ``table`` names it where several hold channels.
+
+    The unit of a channel is its property ``unit_string``. Where the channels are waveforms and none is
+    called time, a column ``time [s]`` is made from their start offset and increment.
+
+    Raises
+    ------
+    InputError
+        For a file that is not TDMS or is cut short, or waveforms of different increments.
+    """
+    nptdms = needs("nptdms", "readers", path, "a LabVIEW TDMS file")
+    try:
+        with nptdms.TdmsFile.open(str(path)) as opened:
+            groups = {
+                g.name: {c.name: (np.asarray(c[:]), dict(c.properties)) for c in g.channels() if len(c) > 1}
+                for g in opened.groups()
+            }
+    except (ValueError, OSError, KeyError, EOFError, TypeError, IndexError) as error:
+        raise InputError(str(path), f"not a TDMS file: {str(error)[:100]}", "a whole file") from error
+    name = chosen(path, [n for n, channels in groups.items() if channels], source, "group")
+    channels = groups[name]
+    longest = max(len(v) for v, _ in channels.values())
+    channels = {k: c for k, c in channels.items() if len(c[0]) == longest}
+    header = with_units(list(channels), [str(p.get("unit_string", "")) for _, p in channels.values()], source)
+    columns = [v for v, _ in channels.values()]
+    waves = {
+        (float(p.get("wf_start_offset", 0.0)), float(p["wf_increment"]))
+        for _, p in channels.values()
+        if p.get("wf_increment")
+    }
+    if waves and not any(re.match(r"(?i)time\b", h) for h in header) and "time" not in source.columns.values():
+        if len(waves) > 1:
+            raise InputError(
+                f"{path}, group {name}", f"{len(waves)} different increments", "one clock, or one group each"
+            )
+        offset, step = waves.pop()
+        header, columns = ["time [s]", *header], [offset + step * np.arange(longest), *columns]
+    return array_sheet(path, header, columns, source)
+
+
+def open_lvm(path: Path, source: Source) -> Sheet:
+    """A LabVIEW measurement file: the table below its last header, tabs or commas as the header says.
+
+    Raises
+    ------
+    InputError
+        For a file without the end of its header, or with more than one block of data.
+    """
+    first = head(path, source.encoding)
+    ends = [i for i, line in enumerate(first.text) if line.startswith(_END)]
+    if not ends:
+        raise InputError(str(path), f"no line {_END}", "a LabVIEW measurement file with its header")
+    words = dict(p for line in first.text for p in [line.rstrip("\t").partition("\t")[::2]] if p[1])
+    separator = {"Tab": "\t", "Comma": ","}.get(words.get("Separator", "Tab").strip(), "\t")
+    decimal = words.get("Decimal_Separator", ".").strip()[:1] or "."
+    names = first.text[ends[-1] + 1] if ends[-1] + 1 < len(first.text) else ""
+    own = {"header_pattern": "^" + re.escape(names[:120]), "delimiter": separator}
+    own |= {} if source.decimal else {"decimal": decimal}
+    skip = source.skip or r"\*\*\*End_of_Header\*\*\*"
+    found = open_csv(path, source.model_copy(update={**own, "skip": skip}))
+    if "X_Value" in found.header and found.header.count("X_Value") > 1:
+        raise InputError(
+            found.where, "an X_Value for each channel", "one X column (X_Columns One), or a file a channel"
+        )
+    return found

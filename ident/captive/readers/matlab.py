@@ -1,0 +1,81 @@
+"""MATLAB files: version 4 to 7 by scipy, version 7.3 (which is HDF5) by h5py."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ident.captive.readers.arrays import array_sheet, chosen
+from ident.captive.readers.hdf5 import open_hdf5
+from ident.captive.readers.table import Sheet
+from ident.captive.source import Source
+from sim.files.errors import InputError
+
+
+def open_matlab(path: Path, source: Source) -> Sheet:
+    """Vectors of one length as columns: of the file, or of the struct or matrix that ``table`` names.
+
+    A matrix has its columns named by ``names``.
+
+    Raises
+    ------
+    InputError
+        For a file that is not MATLAB's, or holds no vectors of one length.
+    """
+    with path.open("rb") as stream:
+        start = stream.read(60)
+    if start.startswith((b"\x89HDF", b"MATLAB 7.3")):
+        return open_hdf5(path, source)
+    from scipy.io import loadmat
+
+    try:
+        found = loadmat(str(path), squeeze_me=True, struct_as_record=False)
+    except (ValueError, TypeError, NotImplementedError, OSError, MemoryError, IndexError, KeyError) as error:
+        raise InputError(
+            str(path), f"not a MATLAB file: {str(error)[:100]}", "a whole file of save -v7 or -v7.3"
+        ) from error
+    own = {k: v for k, v in found.items() if not k.startswith("__")}
+    return from_variables(path, own, source)
+
+
+def _fields(value: Any) -> dict[str, Any] | None:
+    names = getattr(value, "_fieldnames", None)
+    return {n: getattr(value, n) for n in names} if names else None
+
+
+def from_variables(path: Path, variables: dict[str, Any], source: Source) -> Sheet:
+    """Columns among named variables: vectors, structs of vectors, matrices."""
+    vectors = {k: np.ravel(v) for k, v in variables.items() if _vector(v)}
+    groups: dict[str, dict[str, Any]] = {}
+    for name, value in variables.items():
+        fields = _fields(value) if not isinstance(value, dict) else value
+        own = {k: np.ravel(v) for k, v in (fields or {}).items() if _vector(v)}
+        if own:
+            groups[name] = own
+        elif isinstance(value, np.ndarray) and value.ndim == 2 and value.dtype.kind in "iuf":
+            groups[name] = {str(i): column for i, column in enumerate(value.T)}
+    if vectors and (not source.table or source.table not in groups):
+        if source.table:
+            chosen(path, [*groups], source, "variable")
+        columns = vectors
+    else:
+        name = chosen(path, [*groups], source, "variable")
+        columns = groups[name]
+        if all(k.isdigit() for k in columns):
+            if len(source.names) != len(columns):
+                text = f"names = [...] in [[source]], one for each of its {len(columns)} columns"
+                raise InputError(f"{path}, variable {name}", f"a matrix and {len(source.names)} names", text)
+            columns = dict(zip(source.names, columns.values(), strict=True))
+    longest = max((len(v) for v in columns.values()), default=0)
+    columns = {k: v for k, v in columns.items() if len(v) == longest}
+    if not columns:
+        raise InputError(str(path), "no vectors", "vectors of one length, a struct of them, or a matrix with names")
+    return array_sheet(path, list(columns), list(columns.values()), source)
+
+
+def _vector(value: Any) -> bool:
+    if not isinstance(value, np.ndarray) or value.size < 2 or value.dtype.kind not in "iufUSO":
+        return False
+    return value.ndim == 1 or (value.ndim == 2 and 1 in value.shape)

@@ -1,0 +1,157 @@
+"""Text files of flow solvers: Fluent, SU2, Tecplot, plots of STAR-CCM+ that have an abscissa each."""
+
+from __future__ import annotations
+
+import csv
+import re
+import shlex
+from pathlib import Path
+
+import numpy as np
+
+from ident.captive.readers.arrays import array_sheet, chosen
+from ident.captive.readers.table import Sheet, open_columns, open_csv
+from ident.captive.readers.text import Dialect, blocks, head
+from ident.captive.source import Source
+from sim.files.errors import InputError
+
+_PLAIN = Dialect()
+_FLUENT = re.compile(r'^\(\s*"[^"]*"(\s+"[^"]*")+\s*\)\s*$')
+
+
+def fluent_header(lines: list[str]) -> int:
+    """Which of the first lines is the header of a Fluent report file; -1 for none."""
+    return next((i for i, line in enumerate(lines[:5]) if _FLUENT.match(line.strip())), -1)
+
+
+def open_fluent(path: Path, source: Source) -> Sheet:
+    """A report file of Fluent: two lines of titles, ``("Time Step" "flow-time" "force-x")``, numbers.
+
+    Raises
+    ------
+    InputError
+        For a file without that line.
+    """
+    first = head(path, source.encoding, skip=source.skip)
+    at = fluent_header(first.text)
+    if at < 0:
+        raise InputError(str(path), 'no line ("..." "...") of names', "a report file as Fluent writes it")
+    names = shlex.split(first.text[at].strip().strip("()"))
+    return open_columns(path, source.model_copy(update={"names": names, "header_pattern": ""}))
+
+
+def open_su2(path: Path, source: Source) -> Sheet:
+    """A convergence history of SU2; of an unsteady run the last inner iteration of each time step.
+
+    Raises
+    ------
+    InputError
+        For what the reader of tables refuses.
+    """
+    found = open_csv(path, source)
+    if "Time_Iter" not in found.header or "Inner_Iter" not in found.header:
+        return found
+    every = np.vstack(list(found.numbers(list(range(len(found.header))))))
+    step = every[:, found.header.index("Time_Iter")]
+    if np.unique(step).size < 2:
+        return found
+    last = np.append(np.diff(step) != 0.0, True)
+    kept = every[last]
+    return array_sheet(path, found.header, list(kept.T), source, found.first_row)
+
+
+def plots(rows: list[list[str]]) -> bool:
+    """Whether a header has an abscissa for each plot: the same name before every monitor."""
+    names = rows[0] if rows else []
+    return len(names) >= 4 and len(names) % 2 == 0 and len(set(names[::2])) == 1 and names[0] not in names[1::2]
+
+
+def open_plots(path: Path, source: Source, dialect: Dialect) -> Sheet:
+    """Plots of STAR-CCM+ exported side by side: joined at the abscissae that all of them have.
+
+    Raises
+    ------
+    InputError
+        For a cell that is no number, or plots without a common abscissa.
+    """
+    lines: list[tuple[int, list[str]]] = []
+    for block in blocks(path, source.encoding, skip=source.skip):
+        lines += [
+            (row, dialect.cells(line, f"{path}, row {row}")) for row, line in zip(block.rows, block.text, strict=True)
+        ]
+    names = lines[0][1]
+    found: list[dict[float, float]] = [{} for _ in names[1::2]]
+    for row, cells in lines[1:]:
+        for k, series in enumerate(found):
+            pair = cells[2 * k : 2 * k + 2]
+            if len(pair) < 2 or not any(pair):
+                continue
+            at, value = (dialect.number(c) for c in pair)
+            if at is None or value is None:
+                place = f"{path}, row {row}, column {names[2 * k + 1][:60]}"
+                raise InputError(place, repr(" ".join(pair)[:60]), "an abscissa and a number, or both blank")
+            series[at] = value
+    common = sorted(set(found[0]).intersection(*found[1:]))
+    if not common:
+        text = "plots of the same iterations or times"
+        raise InputError(f"{path}, row {lines[0][0]} (header)", f"no {names[0]} that all plots have", text)
+    columns = [np.array(common)] + [np.array([series[a] for a in common]) for series in found]
+    return array_sheet(path, [names[0], *names[1::2]], columns, source, lines[0][0] + 1)
+
+
+def open_tecplot(path: Path, source: Source) -> Sheet:
+    """An ASCII file of Tecplot: VARIABLES, and one ZONE (``table`` names its title), POINT or BLOCK.
+
+    Raises
+    ------
+    InputError
+        For a file without VARIABLES, several zones and none named, or numbers that do not fill the zone.
+    """
+    names: list[str] = []
+    zones: dict[str, tuple[str, list[float], int]] = {}
+    key, place = "", 0
+    listing = False
+    for block in blocks(path, source.encoding, comments=("#",), skip=source.skip):
+        for row, line in zip(block.rows, block.text, strict=True):
+            text = line.strip()
+            word = text.split("=")[0].split()[0].upper() if text else ""
+            if word == "VARIABLES" or (listing and text.startswith('"')):
+                listing = True
+                names += _names(text.partition("=")[2] if word == "VARIABLES" else text)
+            elif word in ("TITLE", "DATASETAUXDATA", "FILETYPE", "VARAUXDATA"):
+                listing = False
+            elif word == "ZONE" or (key and not zones[key][1] and re.match(r"[A-Z]+\s*=", text)):
+                listing = False
+                if word == "ZONE":
+                    title = re.search(r'\bT\s*=\s*"([^"]*)"', text)
+                    key = title[1] if title else f"zone {len(zones) + 1}"
+                    if key in zones:
+                        raise InputError(f"{path}, row {row}", f"zone {key!r} twice", "a title a zone")
+                    zones[key] = ("POINT", [], row)
+                packed = re.search(r"(?i)(?:DATAPACKING|\bF)\s*=\s*(?:FE)?(POINT|BLOCK)", text)
+                zones[key] = (packed[1].upper() if packed else zones[key][0], *zones[key][1:])
+            else:
+                if not names:
+                    raise InputError(f"{path}, row {row}", repr(text[:40]), 'VARIABLES = "..." before any number')
+                if not key:
+                    key = "zone 1"
+                    zones[key] = ("POINT", [], row)
+                for cell in text.replace(",", " ").split():
+                    value = _PLAIN.number(cell)
+                    if value is None:
+                        raise InputError(f"{path}, row {row}, zone {key}", repr(cell[:40]), "a finite number")
+                    zones[key][1].append(value)
+            place = row
+    name = chosen(path, list(zones), source, "zone")
+    packing, values, row = zones[name]
+    if not names or not values or len(values) % len(names):
+        found = f"{len(values)} numbers for {len(names)} variables in zone {name!r}"
+        raise InputError(f"{path}, rows {row} to {place}", found, "as many of each variable")
+    table = np.array(values).reshape((-1, len(names)) if packing == "POINT" else (len(names), -1))
+    columns = list(table.T) if packing == "POINT" else list(table)
+    return array_sheet(path, names, columns, source, row + 1)
+
+
+def _names(text: str) -> list[str]:
+    quoted = re.findall(r'"([^"]*)"', text)
+    return [n.strip() for n in quoted] if quoted else [n for c in csv.reader([text]) for w in c for n in w.split()]

@@ -1,0 +1,100 @@
+"""Workbooks of Excel (xlsx, xlsm, xlsb, xls) and OpenDocument (ods), by the library python-calamine."""
+
+from __future__ import annotations
+
+import datetime
+import re
+from pathlib import Path
+from typing import Any
+
+from ident.captive.readers.arrays import array_sheet, chosen, needs
+from ident.captive.readers.table import Sheet
+from ident.captive.source import Source
+from sim.files.errors import InputError
+
+
+def open_workbook(path: Path, source: Source) -> Sheet:
+    """One worksheet: the first row of names, perhaps a row of units, rows of cells.
+
+    ``table`` names the worksheet where several hold cells, ``header_pattern`` finds the row of names
+    (its cells joined by tabs) below a title, ``skip`` leaves out rows, ``units_row`` reads a row of units.
+
+    Raises
+    ------
+    InputError
+        For a file that is no workbook, a worksheet that is not there, or one without a row of names.
+    """
+    calamine = needs("python_calamine", "readers", path, "a workbook")
+    try:
+        book = calamine.CalamineWorkbook.from_path(str(path))
+        sheets = {name: book.get_sheet_by_name(name).to_python(skip_empty_area=False) for name in _visible(book)}
+    except Exception as error:
+        if not isinstance(error, (calamine.CalamineError, OSError, ValueError)):
+            raise
+        raise InputError(str(path), f"not a workbook: {str(error)[:100]}", "a whole xlsx, xls, xlsb or ods") from error
+    filled = [name for name, rows in sheets.items() if any(_filled(row) for row in rows)]
+    name = chosen(path, filled, source, "worksheet")
+    return _sheet(path, name, sheets[name], source)
+
+
+def _visible(book: Any) -> list[str]:
+    return [str(n) for n in book.sheet_names]
+
+
+def _filled(row: list[Any]) -> bool:
+    return any(cell not in (None, "") for cell in row)
+
+
+def _sheet(path: Path, name: str, rows: list[list[Any]], source: Source) -> Sheet:
+    where = f"{path}, worksheet {name!r}"
+    numbered = [(i, row) for i, row in enumerate(rows, start=1) if _filled(row)]
+    at = 0
+    if source.header_pattern:
+        pattern = re.compile(source.header_pattern)
+        at = next((k for k, (_, row) in enumerate(numbered) if pattern.search(_joined(row))), -1)
+        if at < 0:
+            raise InputError(where, "no row fits header_pattern", repr(source.header_pattern))
+    top, names = numbered[at][0], [_text(cell) for cell in numbered[at][1]]
+    body = numbered[at + 1 :]
+    if source.units_row:
+        if not body:
+            raise InputError(f"{where}, row {top + 1}", "nothing", "a row of units: units_row is true")
+        units = [_text(cell).strip("[]()") for cell in body[0][1]]
+        names = [f"{n} [{u}]" if u else n for n, u in zip(names, units, strict=False)]
+        body = body[1:]
+    if source.skip:
+        leave = re.compile(source.skip)
+        body = [(i, row) for i, row in body if not leave.search(_joined(row))]
+    kept = [k for k, n in enumerate(names) if n]
+    lost = [k for k, n in enumerate(names) if not n and any(len(r) > k and r[k] not in (None, "") for _, r in body)]
+    if lost:
+        raise InputError(f"{where}, row {top}", f"a column without a name ({lost[0] + 1})", "a name for every column")
+    if not kept or not body:
+        raise InputError(where, "no names with rows below them", "a row of names, and header_pattern below a title")
+    columns = [[_cell(row[k]) if len(row) > k else None for _, row in body] for k in kept]
+    return array_sheet(path, [names[k] for k in kept], columns, source, body[0][0])
+
+
+def _joined(row: list[Any]) -> str:
+    return "\t".join(_text(cell) for cell in row)
+
+
+def _text(cell: Any) -> str:
+    cell = _cell(cell)
+    return "" if cell is None else str(cell).strip()
+
+
+def _cell(cell: Any) -> Any:
+    """Dates and times as text that the time column understands; blanks as nothing."""
+    if cell is None or cell == "":
+        return None
+    if isinstance(cell, datetime.datetime):
+        return cell.isoformat(sep="T", timespec="microseconds")
+    if isinstance(cell, datetime.date):
+        # A date without a time is its midnight.
+        return f"{cell.isoformat()}T00:00:00"
+    if isinstance(cell, datetime.time):
+        return cell.isoformat(timespec="microseconds")
+    if isinstance(cell, datetime.timedelta):
+        return cell.total_seconds()
+    return cell

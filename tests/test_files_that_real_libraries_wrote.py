@@ -1,0 +1,362 @@
+"""Workbooks, MATLAB, HDF5, netCDF, TDMS, LVM, gzip and solver files: the same numbers whatever wrote them."""
+
+from __future__ import annotations
+
+import datetime
+import gzip
+import sys
+
+import numpy as np
+import pandas as pd
+import pytest
+from made_campaigns import (
+    BETA,
+    COLUMNS,
+    CONSTANTS,
+    MEANS,
+    SERIES,
+    TIME,
+    VALUES,
+    assert_means,
+    assert_values,
+    campaign,
+    history,
+    tidy,
+)
+
+from ident.captive.campaign import read_campaign
+from ident.captive.readers.opening import reader_of
+from ident.captive.source import Source
+from sim.files.errors import InputError
+
+NAMES = ["beta_deg", "X_N", "Y_N", "N_Nm"]
+RUNS = np.column_stack([BETA, VALUES])
+CHANNELS = ["time_s", "X_N", "Y_N", "N_Nm"]
+RECORD = np.column_stack([TIME, SERIES])
+
+
+def runs_of(folder, name: str, keys: str = ""):
+    campaign(folder, tidy(keys).replace("runs.*", name))
+    return read_campaign(folder).runs
+
+
+def reduced(folder, name: str, keys: str = ""):
+    campaign(folder, history(name, keys))
+    return read_campaign(folder).runs
+
+
+# -- workbooks ------------------------------------------------------------------------------------
+
+
+def book(folder, name: str, rows, sheet: str = "drift", more: str = "") -> None:
+    folder.mkdir(parents=True, exist_ok=True)
+    path = folder / name
+    if name.endswith(".ods"):
+        with pd.ExcelWriter(path, engine="odf") as writer:
+            pd.DataFrame(rows).to_excel(writer, sheet_name=sheet, header=False, index=False)
+        return
+    import openpyxl
+
+    made = openpyxl.Workbook()
+    made.active.title = sheet
+    for row in rows:
+        made.active.append(list(row))
+    if more:
+        made.create_sheet(more).append(["a note"])
+    made.save(path)
+
+
+@pytest.mark.parametrize("name", ["runs.xlsx", "runs.ods"])
+def test_a_worksheet_is_a_table_of_runs(tmp_path, name):
+    book(tmp_path, name, [NAMES, *RUNS.tolist()])
+    assert_values(runs_of(tmp_path, name))
+
+
+def test_a_workbook_of_several_sheets_with_titles_units_and_comments(tmp_path):
+    rows = [["Tank 2, 2019"], [], ["beta", "X", "Y", "N"], ["deg", "kN", "N", "N m"]]
+    rows += [[b, x / 1000.0, y, n] for b, (x, y, n) in zip(BETA, VALUES.tolist(), strict=True)]
+    rows += [["mean of three"]]
+    book(tmp_path, "runs.xlsx", rows, more="notes")
+    keys = 'table = "drift"\nheader_pattern = "^beta"\nunits_row = true\nskip = "^mean"'
+    assert_values(runs_of(tmp_path, "runs.xlsx", keys))
+    with pytest.raises(InputError, match="2 worksheets"):
+        runs_of(tmp_path, "runs.xlsx", keys.replace('table = "drift"\n', ""))
+    with pytest.raises(InputError, match="no worksheet 'yaw'"):
+        runs_of(tmp_path, "runs.xlsx", keys.replace('"drift"', '"yaw"'))
+
+
+@pytest.mark.parametrize("kind", ["datetime", "time", "number"])
+def test_a_workbook_is_a_history_with_dates_or_times_of_day(tmp_path, kind):
+    start = datetime.datetime(2019, 3, 4, 23, 59, 55)
+    steps = [start + datetime.timedelta(seconds=float(t)) for t in TIME]
+    stamps = {"datetime": steps, "time": [s.time() for s in steps], "number": TIME.tolist()}[kind]
+    rows = [CHANNELS, *([t, *row] for t, row in zip(stamps, SERIES.tolist(), strict=True))]
+    book(tmp_path, "run.xlsx", rows)
+    assert_means(reduced(tmp_path, "run.xlsx"))
+
+
+def test_an_xlsx_of_another_writer(tmp_path):
+    import xlsxwriter
+
+    made = xlsxwriter.Workbook(str(tmp_path / "runs.xlsx"))
+    sheet = made.add_worksheet("drift")
+    for i, row in enumerate([NAMES, *RUNS.tolist()]):
+        sheet.write_row(i, 0, row)
+    made.close()
+    assert_values(runs_of(tmp_path, "runs.xlsx"))
+
+
+# -- MATLAB, HDF5, netCDF ----------------------------------------------------------------------------
+
+
+def columns() -> dict[str, np.ndarray]:
+    return dict(zip(CHANNELS, RECORD.T, strict=True))
+
+
+@pytest.mark.parametrize(
+    ("form", "kind"), [("5", "vectors"), ("5", "matrix"), ("5", "struct"), ("4", "vectors"), ("4", "matrix")]
+)
+def test_matlab_files_of_scipy(tmp_path, form, kind):
+    from scipy.io import savemat
+
+    content = {"vectors": columns(), "matrix": {"data": RECORD}, "struct": {"run7": columns()}}[kind]
+    savemat(tmp_path / "run.mat", content, format=form)
+    keys = {"vectors": "", "matrix": f"names = {CHANNELS!r}", "struct": 'table = "run7"'}[kind]
+    assert_means(reduced(tmp_path, "run.mat", keys.replace("'", '"')))
+
+
+def test_matlab_7_3_is_hdf5(tmp_path):
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(tmp_path / "run.mat", "w", userblock_size=512) as made:
+        for name, values in columns().items():
+            made.create_dataset(name, data=values[None, :])
+    with (tmp_path / "run.mat").open("r+b") as stream:
+        stream.write(b"MATLAB 7.3 MAT-file, Platform: GLNXA64, Created on: Mon Mar 4 2019 HDF5 schema 1.00 .")
+    assert_means(reduced(tmp_path, "run.mat"))
+
+
+@pytest.mark.parametrize("kind", ["datasets", "group", "compound", "matrix"])
+def test_hdf5_files_of_h5py(tmp_path, kind):
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(tmp_path / "run.h5", "w") as made:
+        if kind in ("datasets", "group"):
+            at = made.create_group("run/7") if kind == "group" else made
+            for name, unit, values in zip(["time", "X", "Y", "N"], ["s", "kN", "N", "N*m"], RECORD.T, strict=True):
+                one = at.create_dataset(name, data=values / (1000.0 if unit == "kN" else 1.0), compression="gzip")
+                one.attrs["units"] = unit
+        elif kind == "compound":
+            made["run"] = np.rec.fromarrays(RECORD.T, names=CHANNELS)
+        else:
+            made["run"] = RECORD
+            made["run"].attrs["columns"] = CHANNELS
+    assert_means(reduced(tmp_path, "run.h5", 'table = "run/7"' if kind == "group" else ""))
+
+
+@pytest.mark.parametrize("engine", ["h5netcdf", "scipy"])
+def test_netcdf_files_of_xarray(tmp_path, engine):
+    xarray = pytest.importorskip("xarray")
+    units = {"X": "kN", "Y": "N", "N": "N m"}
+    data = {
+        n: ("time", SERIES[:, i] / (1000.0 if u == "kN" else 1.0), {"units": u})
+        for i, (n, u) in enumerate(units.items())
+    }
+    made = xarray.Dataset(data, coords={"time": ("time", TIME, {"units": "s"})})
+    made.to_netcdf(tmp_path / "run.nc", engine=engine)
+    assert_means(reduced(tmp_path, "run.nc"))
+
+
+# -- LabVIEW -----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("kind", ["time", "waveform", "two groups"])
+def test_tdms_files_of_nptdms(tmp_path, kind):
+    nptdms = pytest.importorskip("nptdms")
+    wave = {"wf_increment": 0.05, "wf_start_offset": 0.0} if kind == "waveform" else {}
+    made = [
+        nptdms.ChannelObject("run", n, SERIES[:, i], properties={"unit_string": u, **wave})
+        for i, (n, u) in enumerate({"X": "N", "Y": "N", "N": "N*m"}.items())
+    ]
+    if not wave:
+        made.insert(0, nptdms.ChannelObject("run", "time", TIME, properties={"unit_string": "s"}))
+    if kind == "two groups":
+        made.append(nptdms.ChannelObject("zero", "X", SERIES[:, 0]))
+    with nptdms.TdmsWriter(str(tmp_path / "run.tdms")) as writer:
+        writer.write_segment(made)
+    keys = 'table = "run"' if kind == "two groups" else ""
+    assert_means(reduced(tmp_path, "run.tdms", keys))
+    if keys:
+        with pytest.raises(InputError, match="2 groups"):
+            reduced(tmp_path, "run.tdms")
+
+
+@pytest.mark.parametrize("separator", ["Tab", "Comma"])
+def test_lvm_files(tmp_path, separator):
+    """The header as LabVIEW 2012 on writes it (NI, Specification for the LabVIEW measurement file, 2023)."""
+    mark = {"Tab": "\t", "Comma": ","}[separator]
+    lines = ["LabVIEW Measurement\t", "Writer_Version\t2", "Reader_Version\t2", f"Separator\t{separator}"]
+    lines += [
+        "Decimal_Separator\t.",
+        "Multi_Headings\tNo",
+        "X_Columns\tOne",
+        "Time_Pref\tRelative",
+        "***End_of_Header***\t",
+    ]
+    lines += ["Channels\t3\t\t\t", "Samples\t400\t400\t400\t", "X0\t0.0\t0.0\t0.0\t", "Delta_X\t0.05\t0.05\t0.05\t"]
+    lines += ["***End_of_Header***\t\t\t\t", mark.join(["X_Value", "Fx", "Fy", "Mz", "Comment"])]
+    lines += [mark.join(map(repr, row)) + mark for row in RECORD.tolist()]
+    (tmp_path / "run.lvm").write_text("\n".join(lines) + "\n", "utf-8")
+    named = 'ignore = ["Comment"]\n[source.columns]\nX_Value = "time [s]"\nFx = "X [N]"\nFy = "Y [N]"\nMz = "N [N m]"\n'
+    assert_means(reduced(tmp_path, "run.lvm", named))
+
+
+# -- solvers ------------------------------------------------------------------------------------------
+
+NAMED = '[source.columns]\n"{0}" = "time [s]"\n"{1}" = "X [N]"\n"{2}" = "Y [N]"\n"{3}" = "N [N m]"\n'
+
+
+def test_fluent_report_files_by_their_header(tmp_path):
+    lines = [
+        '"report-file-0"',
+        '"Time Step" "force-x etc.."',
+        '("Time Step" "flow-time" "force-x" "force-y" "moment-z")',
+    ]
+    lines += [" ".join(map(repr, (i, *row))) for i, row in enumerate(RECORD.tolist())]
+    (tmp_path / "run.out").write_text("\n".join(lines), "utf-8")
+    names = NAMED.format("flow-time", "force-x", "force-y", "moment-z")
+    assert_means(reduced(tmp_path, "run.out", 'ignore = ["Time Step"]\n' + names))
+
+
+def test_plots_with_an_abscissa_each_are_joined_where_all_have_one(tmp_path):
+    head = '"Iteration","X Monitor: X (N)","Iteration","Y Monitor: Y (N)","Iteration","N Monitor: N (N-m)"'
+    rows = []
+    for i in range(400):
+        # The moment is written every second iteration, so its plot is half as long.
+        moment = f"{2 * i},{float(SERIES[2 * i, 2])!r}" if 2 * i < 400 else ","
+        rows.append(f"{i},{float(SERIES[i, 0])!r},{i},{float(SERIES[i, 1])!r},{moment}")
+    (tmp_path / "run.csv").write_text("\n".join([head, *rows]), "utf-8")
+    patterns = "[source.patterns]\n'^Iteration$' = \"time [s]\"\n'^X ' = \"X\"\n'^Y ' = \"Y\"\n'^N ' = \"N\"\n"
+    run = reduced(tmp_path, "run.csv", patterns).iloc[0]
+    np.testing.assert_allclose(run[COLUMNS].astype(float), SERIES[::2].mean(axis=0), rtol=1e-9)
+
+
+def test_su2_histories_with_padded_quotes_and_inner_iterations(tmp_path):
+    head = '"Time_Iter","Outer_Iter","Inner_Iter",    "CFx"       ,   "CFy"  ,  "CMz"      '
+    rows = []
+    for step, row in enumerate(SERIES.tolist()):
+        rows += [
+            f"{step:12d},           0,{inner:12d}, " + ", ".join(f"{v + 9.0 - inner:.9f}" for v in row)
+            for inner in range(10)
+        ]
+    (tmp_path / "run.csv").write_text("\n".join([head, *rows]), "utf-8")
+    names = NAMED.format("Time_Iter", "CFx", "CFy", "CMz")
+    run = reduced(tmp_path, "run.csv", 'ignore = ["Outer_Iter", "Inner_Iter"]\n' + names).iloc[0]
+    np.testing.assert_allclose(run[COLUMNS].astype(float), MEANS, rtol=1e-6)
+
+
+@pytest.mark.parametrize("packing", ["POINT", "BLOCK"])
+def test_tecplot_zones(tmp_path, packing):
+    values = RECORD if packing == "POINT" else RECORD.T
+    lines = ['TITLE = "drift 5"', 'VARIABLES = "time [s]" "X [N]"', '"Y [N]", "N [N m]"']
+    lines += ['ZONE T="start"', "I=2", "F=POINT", "0 1 2 3", "1 1 2 3"]
+    lines += [f'ZONE T="run", I={len(RECORD)}, DATAPACKING={packing}']
+    lines += ["\n".join(" ".join(map(repr, row[k : k + 8])) for k in range(0, len(row), 8)) for row in values.tolist()]
+    (tmp_path / "run.dat").write_text("\n".join(lines), "utf-8")
+    assert_means(reduced(tmp_path, "run.dat", 'table = "run"'))
+    with pytest.raises(InputError, match="2 zones"):
+        reduced(tmp_path, "run.dat")
+
+
+# -- packed, unread, and clocks --------------------------------------------------------------------------
+
+
+def test_gzip_is_unpacked(tmp_path):
+    text = "\n".join([",".join(CHANNELS), *(",".join(map(repr, row)) for row in RECORD.tolist())])
+    with gzip.open(tmp_path / "run.csv.gz", "wt", encoding="utf-8") as stream:
+        stream.write(text)
+    assert_means(reduced(tmp_path, "run.csv.gz"))
+    (tmp_path / "run.csv.gz").write_bytes((tmp_path / "run.csv.gz").read_bytes()[:-900])
+    with pytest.raises(InputError, match="cannot be read"):
+        reduced(tmp_path, "run.csv.gz")
+
+
+@pytest.mark.parametrize(
+    ("start", "words"),
+    [
+        (b"%PDF-1.7\n", "a PDF"),
+        (b"\x89PNG\r\n\x1a\n", "a PNG"),
+        (b"\xff\xd8\xff\xe0", "JPEG"),
+        (b"7z\xbc\xaf\x27\x1c", "7-Zip"),
+    ],
+)
+def test_what_stays_unread_is_refused_by_its_name(tmp_path, start, words):
+    campaign(tmp_path, tidy().replace("runs.*", "runs.csv"))
+    (tmp_path / "runs.csv").write_bytes(start + b"\0" * 50)
+    with pytest.raises(InputError, match=words):
+        read_campaign(tmp_path)
+
+
+@pytest.mark.parametrize("name", ["run.xlsx", "run.h5", "run.nc", "run.mat", "run.tdms"])
+def test_a_binary_file_cut_short_is_refused(tmp_path, name):
+    start = {"xlsx": b"PK\x03\x04", "h5": b"\x89HDF\r\n\x1a\n", "nc": b"CDF\x01", "mat": b"MATLAB 5.0", "tdms": b"TDSm"}
+    campaign(tmp_path, history(name))
+    (tmp_path / name).write_bytes(start[name.split(".")[1]] + b"\x07" * 300)
+    with pytest.raises(InputError, match=r"not an? |no columns|0 "):
+        read_campaign(tmp_path)
+
+
+def test_a_library_that_is_not_installed_is_named_with_its_extra(tmp_path, monkeypatch):
+    book(tmp_path, "runs.xlsx", [NAMES, *RUNS.tolist()])
+    monkeypatch.setitem(sys.modules, "python_calamine", None)
+    with pytest.raises(InputError, match=r"ident-submarine\[readers\]"):
+        runs_of(tmp_path, "runs.xlsx")
+
+
+def stamps(kind: str) -> list[str]:
+    start = datetime.datetime(2019, 3, 4, 23, 59, 55)
+    at = [start + datetime.timedelta(seconds=float(t)) for t in TIME]
+    forms = {
+        "hh:mm:ss": lambda i: at[i].strftime("%H:%M:%S.%f")[:-3],
+        "iso": lambda i: at[i].isoformat(timespec="milliseconds"),
+        "iso zone": lambda i: at[i].isoformat(sep=" ", timespec="milliseconds") + "+01:00",
+        "german": lambda i: at[i].strftime("%d.%m.%Y %H:%M:%S.%f")[:-3],
+        "american": lambda i: at[i].strftime("%m/%d/%Y %I:%M:%S.%f")[:-3] + at[i].strftime(" %p"),
+        "mm:ss": lambda i: f"{int(TIME[i] // 60):02d}:{TIME[i] % 60:05.2f}",
+        "epoch ms": lambda i: str(1551743995000 + round(1000 * TIME[i])),
+        "serial days": lambda i: repr(43528.0 + (86395.0 + float(TIME[i])) / 86400.0),
+    }
+    return [forms[kind](i) for i in range(len(TIME))]
+
+
+@pytest.mark.parametrize(
+    "kind", ["hh:mm:ss", "iso", "iso zone", "german", "american", "mm:ss", "epoch ms", "serial days"]
+)
+def test_every_clock_gives_the_frequency_of_the_motion(tmp_path, kind):
+    """A sway at 0.25 Hz through midnight: the record's own frequency says what a second of the clock is."""
+    w = 2.0 * np.pi * 0.25
+    y = 700.0 * np.sin(w * TIME)
+    lines = ["Time,X_N,Y_N,displacement_m"]
+    lines += [
+        f"{s},-30.0,{v!r},{float(0.3 * np.sin(w * t))!r}"
+        for s, v, t in zip(stamps(kind), y.tolist(), TIME, strict=True)
+    ]
+    (tmp_path / "run.csv").write_text("\n".join(lines), "utf-8")
+    constants = CONSTANTS.replace('test = "drift_horizontal"\n', "").replace("5 deg", "0 deg")
+    reduction = '[source.reduction]\nkind = "oscillatory"\nmotion = "sway"\n'
+    campaign(tmp_path, history("run.csv", '[source.columns]\nTime = "time [s]"\n', constants, reduction))
+    done = read_campaign(tmp_path)
+    assert done.reduced[0].line.frequency == pytest.approx(0.25, rel=1e-4)
+    at = done.runs.set_index(done.runs["run_id"].str[-2:])
+    assert at["Y"]["-a"] - at["Y"]["+a"] == pytest.approx(-1400.0, rel=1e-3)
+
+
+def test_a_clock_that_cannot_be_read_names_the_key(tmp_path):
+    (tmp_path / "run.csv").write_text("Time,X_N\nfive past,1\nsix past,2\n", "utf-8")
+    campaign(tmp_path, history("run.csv", '[source.columns]\nTime = "time [s]"\n'))
+    with pytest.raises(InputError, match="rate_hz"):
+        read_campaign(tmp_path)
+
+
+def test_formats_are_known_by_their_first_bytes(tmp_path):
+    for start, reader in ((b"TDSm", "tdms"), (b"PK\x03\x04", "workbook"), (b"CDF\x02", "netcdf"), (b"PAR1", "parquet")):
+        (tmp_path / "file.bin").write_bytes(start + b"\0" * 20)
+        assert reader_of(tmp_path / "file.bin", Source(files="file.bin")) == reader
