@@ -155,6 +155,7 @@ HEADER_CASES: dict[str, tuple[dict[str, Any], dict[str, Any], dict[str, Any]]] =
     "CampaignFile.tare": ({}, TARE, {}),
     "CampaignFile.half_model": ({}, HALF, {"files": STRAIGHT}),
     "CampaignFile.hydrostatics": ({}, HYDRO, {}),
+    "CampaignFile.absent": ({}, {"absent": {"drift_horizontal.Y": "a balance of one component"}}, {}),
     "CampaignFile.tables": ({}, {"tables.reference": "no.csv"}, {}),
     "CampaignFile.source": ({}, {"source.0.files": "none.csv"}, {}),
     "CampaignFrame.x": ({}, {"frame.x": "aft", "frame.z": "up"}, {}),

@@ -105,11 +105,13 @@ def _digest(path: Path) -> str:
         raise InputError(str(path), f"cannot be read: {error.strerror}", "a readable file") from error
 
 
-def _sources(folder: Path, header: CampaignFile) -> list[Source]:
+def _sources(folder: Path, header: CampaignFile, vehicle: Vehicle) -> list[Source]:
     """The sources a campaign declares, else one CSV or Parquet file a test beside it."""
     if header.source:
         return header.source
-    beside = header.tables.given().values()
+    # Tables that the vehicle file names are no runs.
+    named = [Path(p) for p in (vehicle.terms, vehicle.errata, vehicle.geometry) if p]
+    beside = {*header.tables.given().values(), *(p.name for p in named if p.parent.resolve() == folder.resolve())}
     names = [sorted(p.name for p in folder.glob(kind) if p.name not in beside) for kind in ("*.csv", "*.parquet")]
     found = [Source(files=glob.escape(name)) for kind in names for name in kind]
     if not found:
@@ -147,7 +149,7 @@ def read_runs(folder: Path, header: CampaignFile, vehicle: Vehicle, tell: Tell =
     """
     found = Found()
     words = {"test": list(tests().index), "part": vehicle.part_names(), "quality": list(header.quality)}
-    for source in _sources(folder, header):
+    for source in _sources(folder, header, vehicle):
         for table in source_runs(folder, source, header, found, tell):
             _check_words(folder, table, {**words, "decoupled": ["", "True", "False"]})
             _check_complete(folder, table, vehicle)

@@ -16,6 +16,8 @@ from dataclasses import dataclass, replace
 from functools import cache
 from importlib.resources import files
 
+from sim.files.errors import InputError
+
 OUTPUTS = ("X", "Y", "Z", "K", "M", "N")
 # The state in its order: velocities in the body frame, position and angles in the earth frame.
 STATES = ("u", "v", "w", "p", "q", "r", "x", "y", "z", "phi", "theta", "psi")
@@ -224,6 +226,68 @@ def terms(term_set: str = "reduced") -> tuple[Term, ...]:
     if term_set == "gertler_hagen":
         chosen = [t if t.group == "propulsion" else replace(t, axes=(), parity={}, extrapolation={}) for t in chosen]
     return tuple(chosen)
+
+
+# Columns of a vehicle's own term file; the others of the table are the defaults below.
+OWN_COLUMNS = ("name", "output", "power", "multiplier", "part", "test")
+_OWN_DEFAULTS = {
+    "group": "own",
+    "norm": "rho/2 L",
+    "axes": "",
+    "parity": "",
+    "extrapolation": "",
+    "equation": "",
+    "note": "",
+}
+
+
+@cache
+def own_terms(path: str, term_set: str, changed: int = 0) -> tuple[Term, ...]:
+    """Rows that a vehicle adds to its term set, from a CSV file beside its own.
+
+    Parameters
+    ----------
+    path : Of the file: columns ``name output power multiplier part test``, perhaps others of ``data/terms.csv``.
+    term_set : The set they are added to.
+    changed : Time of its last change, so that a file is read again after one.
+
+    Raises
+    ------
+    InputError
+        For a file that cannot be read, a column that is missing or unknown, a name of the set, or a
+        row that contradicts itself.
+    """
+    try:
+        with open(path, encoding="utf-8-sig", newline="") as stream:
+            rows = list(csv.DictReader(stream))
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise InputError(path, f"cannot be read: {error}", "a CSV file of terms in UTF-8") from error
+    known = (*OWN_COLUMNS, *_OWN_DEFAULTS)
+    found: list[Term] = []
+    taken = {t.name for t in terms(term_set)}
+    for number, row in enumerate(rows, start=2):
+        place = f"{path}, row {number}"
+        given = {k: (v or "").strip() for k, v in row.items() if isinstance(k, str)}
+        wrong = [c for c in OWN_COLUMNS if not given.get(c)] + [k for k in row if k not in known]
+        if wrong:
+            raise InputError(f"{place}, column {wrong[0]}", "nothing or unknown", ", ".join(known))
+        if given["name"] in taken:
+            raise InputError(f"{place}, column name", repr(given["name"]), f"a name the set {term_set} does not have")
+        if given["output"] not in OUTPUTS or not given["power"].isdigit() or not 0 < int(given["power"]) < 10:
+            raise InputError(
+                place, f"output {given['output']}, power {given['power']}", "X Y Z K M N and a whole number"
+            )
+        made = _term({**_OWN_DEFAULTS, "sets": term_set, **given})
+        try:
+            check(made)
+        except CatalogueError as error:
+            text = "factors, axes and parities as in data/terms.csv, joined by *"
+            raise InputError(place, str(error), text) from error
+        taken.add(made.name)
+        found.append(made)
+    if not found:
+        raise InputError(path, "no row", "at least one term")
+    return tuple(found)
 
 
 @cache

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
 from sim.boat import catalogue
 from sim.boat.catalogue import MIRROR_OUTPUT, Term
 from sim.boat.vehicle import Plane, Vehicle
+from sim.files.errors import InputError
 
 Point = tuple[float, ...]
 
@@ -25,9 +27,28 @@ def vehicle_terms(vehicle: Vehicle) -> tuple[Term, ...]:
     driven = ("propeller",) if vehicle.propeller else ()
     return tuple(
         t
-        for t in catalogue.terms(vehicle.term_set)
+        for t in all_terms(vehicle)
         if t.group != out_of_use and (t.part in ("hull", "section", *driven) or t.part in planes)
     )
+
+
+def all_terms(vehicle: Vehicle) -> tuple[Term, ...]:
+    """The rows of a vehicle's term set and those of its own term file.
+
+    Raises
+    ------
+    InputError
+        For an own term file that cannot be used, or a term of a part the vehicle does not have.
+    """
+    if vehicle.terms is None:
+        return catalogue.terms(vehicle.term_set)
+    path = Path(vehicle.terms)
+    changed = path.stat().st_mtime_ns if path.is_file() else 0
+    own = catalogue.own_terms(vehicle.terms, vehicle.term_set, changed)
+    for term in own:
+        if term.part not in (*vehicle.part_names(), "section"):
+            raise InputError(f"{path}, term {term.name}, column part", repr(term.part), ", ".join(vehicle.part_names()))
+    return (*catalogue.terms(vehicle.term_set), *own)
 
 
 def parts_of(term: Term, vehicle: Vehicle) -> list[str]:
@@ -80,8 +101,11 @@ def mirror_of(term: Term, part: str, vehicle: Vehicle) -> Mirror:
         sign *= turn if factor == "deflection" else -1 if factor in catalogue.MIRRORED_FACTORS else 1
     like = [
         t
-        for t in catalogue.terms(vehicle.term_set)
+        for t in all_terms(vehicle)
         if t.part == partner.name and t.output == term.output and t.factors == term.factors
     ]
+    if not like:
+        where = f"vehicle {vehicle.name}, term {term.name}"
+        raise InputError(where, f"no such term of {partner.name}", f"the same row for {partner.name}, the mirror image")
     signs = tuple(turn if a == "delta" else catalogue.axes()[a].mirror for a in term.axes)
     return Mirror(like[0].name, partner.name, sign, signs)

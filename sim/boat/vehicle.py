@@ -280,6 +280,8 @@ class Vehicle(Data):
     tanks : Ballast and trim tank, where the boat has them.
     geometry : File of its surface, beside this one; waves need it.
     errata : Table of what is printed wrong in its source, beside this file.
+    terms : CSV file of terms that its set does not have, beside this file (columns ``name``, ``output``,
+        ``power``, ``multiplier``, ``part``, ``test``).
     """
 
     name: Name
@@ -295,6 +297,7 @@ class Vehicle(Data):
     tanks: Tanks | None = None
     geometry: str | None = None
     errata: str | None = None
+    terms: str | None = None
 
     @field_validator("planes")
     @classmethod
@@ -427,7 +430,7 @@ def load_vehicle(name: str | Path, beside: str | Path = "") -> Vehicle:
     vehicle.frame.declared(where)
     check_vehicle(vehicle, where)
     folder = Path(where).parent if Path(where).suffix == ".toml" else Path(str(files("sim") / "vehicles"))
-    for key in ("geometry", "errata"):
+    for key in ("geometry", "errata", "terms"):
         if getattr(vehicle, key) is not None:
             setattr(vehicle, key, str(folder / getattr(vehicle, key)))
     return vehicle.turned(PROGRAM)
