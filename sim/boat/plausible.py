@@ -68,16 +68,16 @@ def _mass(vehicle: Any) -> Iterator[tuple[str, str, str]]:
     share = given.displaced_mass.value / given.mass.value
     if not 1.0 - _OUT_OF_TRIM < share < 1.0 + _OUT_OF_TRIM:
         yield "particulars.displaced_mass", f"{share:.3g} times the mass", "about the mass: a boat that floats"
-    if not vehicle.propeller.diameter.value < length:
-        yield "propeller.diameter", f"{vehicle.propeller.diameter.value:g} m", f"less than the length of {length:g} m"
+    if vehicle.propeller and not vehicle.diameter < length:
+        yield "propeller.diameter", f"{vehicle.diameter:g} m", f"less than the length of {length:g} m"
 
 
 def _places(vehicle: Any) -> Iterator[tuple[str, str, str]]:
     given, propeller, tanks = vehicle.particulars, vehicle.propeller, vehicle.tanks
     places = {
         "particulars.centre_of_gravity": given.centre_of_gravity.value,
-        "particulars.sail_top": given.sail_top.value,
-        **({"propeller.position": propeller.position.value} if propeller.position else {}),
+        **({"particulars.sail_top": given.sail_top.value} if given.sail_top else {}),
+        **({"propeller.position": propeller.position.value} if propeller and propeller.position else {}),
         **({"tanks.ballast.position": tanks.ballast.position.value} if tanks else {}),
         **{f"planes, {p.name}, position": p.position for p in vehicle.planes},
         **{f"sections, {s.name}, position": s.position for s in (vehicle.sections.centres if vehicle.sections else [])},

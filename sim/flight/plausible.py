@@ -52,7 +52,7 @@ def check_revolutions(case: Case, vehicle: Vehicle, needed: float) -> None:
     NoEquilibrium
         When they are beyond the limits.
     """
-    low, high = case.command.n.limits_rps or vehicle.propeller.limits.value
+    low, high = case.command.n.limits_rps or vehicle.needed_propeller("a flight").limits.value
     if not low <= needed <= high:
         at = f"{case.initial.speed_mps:.4g} m/s and D0 = {case.initial.depth_m:.4g} m"
         limits = f"the propeller's limits are {low:g} to {high:g} 1/s"
