@@ -25,13 +25,14 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares, minimize_scalar
 
 from ident.calibration.file import CalibrationFile, Parameter, Training, apply
+from ident.validation.trial_reference import TRIAL, Referenced, referenced
 from ident.validation.validate import check_reference
 from sim.boat.coefficients import Coefficients
 from sim.boat.mass import Environment
 from sim.boat.vehicle import Vehicle, load_vehicle
 from sim.files.errors import InputError
 from sim.files.record import Record
-from sim.flight.case import Case, Series, load_case, load_reference
+from sim.flight.case import Case, Series, load_case
 from sim.flight.simulate import Simulation, environment_of, equipped, fly, water_of
 from sim.flight.trim import NoEquilibrium
 from sim.kernel.assemble import Assembly
@@ -228,6 +229,13 @@ def _refuse(where: str, training: Training, key: str, found: str, allowed: Seque
     return InputError(f"{where}, training {training.case}, key {key}", repr(found), ", ".join(allowed))
 
 
+def _flown(held: Referenced, recorded: bool) -> Case:
+    """The case as it is flown: from the start that a trial measured, with its controls where the case says so."""
+    if recorded and held.driven is not None:
+        return held.driven
+    return held.case.started_as(TRIAL) or held.case if TRIAL in held.series.smooth else held.case
+
+
 def problem(
     spec: CalibrationFile, where: str, vehicle: Vehicle, rows: pd.DataFrame, chosen: list[Parameter]
 ) -> Problem:
@@ -250,7 +258,9 @@ def problem(
     for training in spec.training:
         own = Path(where).parent / training.case
         case, place = load_case(own if training.case.endswith(".toml") else training.case)
-        reference = load_reference(case, place)
+        held = referenced(case, place)
+        recorded = case.reference is not None and case.reference.controls == "recorded"
+        case, reference = held.case, held.series
         check_reference(case, reference, place)
         # A case names its vehicle, or the vehicle's file.
         flown = load_vehicle(case.vehicle, beside=place).name
@@ -265,7 +275,7 @@ def problem(
             if channel not in known:
                 raise _refuse(where, training, "channels", channel, known)
             channels.append(_channel(training, reference, case.name, channel, used))
-        cases[case.name] = (case, reference.abscissa)
+        cases[case.name] = (_flown(held, recorded), reference.abscissa)
     return Problem(vehicle, rows, chosen, cases, channels)
 
 

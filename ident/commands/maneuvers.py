@@ -37,8 +37,9 @@ if TYPE_CHECKING:
     "--reference",
     type=click.Path(path_type=Path),
     default=None,
-    help="With --case: your own reference, a CSV of source, channel, t or s, value, unit, and sigma if known.",
+    help="With --case: a recorded trial, or a CSV of source, channel, t or s, value, unit, and sigma if known.",
 )
+@click.option("--trial", type=click.Path(path_type=Path), default=None, help="With --reference: its trial.toml.")
 @click.option(
     "--frame",
     type=click.Choice(["source", "program"]),
@@ -81,6 +82,8 @@ def validate(
         raise click.UsageError("--dask goes with --samples")
     if own["frame"] and not own["reference"]:
         raise click.UsageError("--frame goes with --reference")
+    if own["trial"] and not own["reference"]:
+        raise click.UsageError("--trial goes with --reference")
     console = console_for(quiet=json_path == "-")
     with equilibrium_of(case or "of --all"):
         done, board = ([_one(case, db, version, own, console)], None) if case else _all(db, version, cases, console)

@@ -40,7 +40,7 @@ def channels_of(simulation: Simulation) -> Channels:
 
 def reference_channels(reference: Series, source: str) -> Channels:
     """Channels of a source on the abscissa of its first channel, in radians."""
-    series = reference[source]
+    series = reference.measured_on(source)
     if not series:
         return {}
     along = next(iter(series.values())).abscissa
@@ -184,7 +184,7 @@ def _of_angle(
     for label, flight in flights.items():
         columns[label] = measure(flight["t"], flight[angle], (flight["t"], flight[rate]) if rate else None)
     for source in _sources(case):
-        series = reference[source]
+        series = reference.measured_on(source)
         if angle not in series or reference.abscissa != "t":
             continue
         turn = (series[rate].abscissa, series[rate].value) if rate and rate in series else None
@@ -212,8 +212,8 @@ def _zigzags(case: Case, reference: Series, flights: dict[str, Simulation]) -> d
     length = flights["simulated"].length
     for source in _sources(case) if not horizontal else []:
         label = _label(case, source)
-        if label in columns and "dz_over_L0" in reference[source]:
-            dz = reference[source]["dz_over_L0"]
+        if label in columns and "dz_over_L0" in reference.measured_on(source):
+            dz = reference.measured_on(source)["dz_over_L0"]
             execute = columns[label]["execute_2_s"]
             over = vertical.depth_overshoot(dz.abscissa, dz.value * length, execute, sense)
             columns[label]["depth_overshoot_1_m"] = over

@@ -61,7 +61,7 @@ class SmoothPath:
     mean : (k,) coefficients of the most likely path.
     factor : Banded upper factor of the precision of the coefficients.
     sigma : Standard error of one sample of the path.
-    samples : What it was made from, each with its standard error.
+    samples : What it was made from, less ``centre``, each with its standard error.
     """
 
     knots: Array
@@ -69,6 +69,7 @@ class SmoothPath:
     factor: Array
     sigma: float
     samples: tuple[Samples, ...]
+    centre: float
 
     def __call__(self, time: Array | float, derivative: int = 0) -> Array:
         """The most likely path, or its derivative, at some times [s]."""
@@ -82,8 +83,7 @@ class SmoothPath:
 
     def again(self) -> SmoothPath:
         """This path smoothed once more as its samples were: the difference is the bias of smoothing."""
-        right = np.zeros(self.mean.size)
-        centre = float(self.mean.mean())
+        right, centre = np.zeros(self.mean.size), self.centre
         for one in self.samples:
             value = _fitted(self.knots, self.mean - centre, one)
             right += _gram(self.knots, replace(one, value=value))[1]
@@ -236,7 +236,7 @@ def smooth(samples: list[Samples], lo: float | None = None, hi: float | None = N
     density *= _ROUGHER
     factor, solved = _solve(bands + penalty / density, right)
     # B-splines sum to one: the mean is a shift of every coefficient.
-    return SmoothPath(knots, solved + centre, factor, told[0].sigma, tuple(told))
+    return SmoothPath(knots, solved + centre, factor, told[0].sigma, tuple(told), centre)
 
 
 def _density(knots: Array, told: list[Samples], bands: Array, right: Array, near: float) -> float:

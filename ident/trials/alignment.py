@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +23,10 @@ _APPROACH_S, _APPROACH_SAMPLES, _LONGEST_S = 5.0, 8, 60.0
 _RUN_UP_S = 20.0
 # Two channels of one motion are taken together when they agree to this.
 _CLOSE = 0.02
+# Heading change up to which a turn is still being entered.
+_ENTRY = math.radians(60.0)
+# A course is steady when it turns by less than this share of the maneuver's largest rate.
+_STEADY = 0.01
 # Share of a body rate by which it may differ from the rate of the angle, along the record.
 _BODY_RATE = 0.005
 _NOISE = {"psi": "heading_deg", "theta": "pitch_deg", "phi": "roll_deg", "r": "yaw_rate_degps", "north": "position_m"}
@@ -169,8 +173,26 @@ def _angle(record: Record, execute: float, angle: str, spec: TrialFile, said: li
     if mean:
         said.append(f"{name} {mean[2]}")
         return mean[0], mean[1]
+    entry = _entry(record, execute)
+    if entry:
+        said.append(f"{name} {math.degrees(entry[0]):.3f} deg +- {math.degrees(entry[1]):.3f}, {entry[2]}")
+        return entry[0], entry[1]
     said.append(f"{name}: that of the smooth path at the execute; no approach is recorded")
     return None
+
+
+def _entry(record: Record, execute: float) -> tuple[float, float, str] | None:
+    """Heading at the execute from the entry into a turn: the turn itself, long and even, says nothing of it."""
+    after = record.kept(record.abscissa >= execute - 1e-9)
+    beyond = np.flatnonzero(np.abs(after.value - after.value[0]) > _ENTRY)
+    if not beyond.size or beyond[0] < 16 or beyond[0] > 0.6 * len(after):
+        return None
+    entry = after.kept(slice(0, int(beyond[0])))
+    said: list[str] = []
+    path = _from_a_steady_course(path_of(entry), execute, said)
+    value, bias = float(path(execute)), float(path.again()(execute) - path(execute))
+    text = f"from the first {entry.abscissa[-1] - execute:.0f} s of the turn; no approach is recorded"
+    return value, math.hypot(float(path.deviation(execute)[0]), bias), "; ".join([text, *said])
 
 
 def _of_revolutions(one: Recording) -> tuple[float, float, str] | None:
@@ -206,6 +228,8 @@ def paths(one: Recording, start: Start, spec: TrialFile) -> tuple[dict[str, Smoo
             if joined is not None:
                 path = joined
                 said.append(f"{one.headers[name]} and {one.headers[rate]} taken together: they agree")
+        if name in ("psi", "theta") and start.angle is None:
+            path = _from_a_steady_course(path, start.time, said)
         found[name] = path
     return found, said
 
@@ -223,6 +247,18 @@ def _from_run_up(record: Record, execute: float, noise: float) -> tuple[list[Sam
         if best[1] is None or best[1].sigma / 1.4 <= path.sigma <= 1.4 * best[1].sigma:
             best = (samples, path)
     return best
+
+
+def _from_a_steady_course(path: SmoothPath, execute: float, said: list[str]) -> SmoothPath:
+    """A path without an approach, its rate at the execute zero to a share of the largest, where it may be."""
+    grid = np.linspace(float(path.knots[4]), float(path.knots[-5]), 1000)
+    share = _STEADY * float(np.max(np.abs(path(grid, 1))))
+    there = float(path(execute, 1))
+    if share <= 0.0 or abs(there) > 3.0 * math.hypot(share, float(path.deviation(execute, 1)[0])):
+        return path
+    said.append(f"steady course at the execute: its rate there is zero to {100.0 * _STEADY:g} % of the largest")
+    steady = Samples(np.array([execute]), np.zeros(1), 1, share)
+    return smooth([replace(path.samples[0], value=path.samples[0].value + path.centre), *path.samples[1:], steady])
 
 
 def _joined(samples: list[Samples], rate: Record, path: SmoothPath, noise: float) -> SmoothPath | None:

@@ -13,7 +13,7 @@ from ident.text import on_screen
 from ident.trials.criteria import criteria
 from ident.trials.measure import Value
 from ident.trials.spec import TrialFile, load_spec
-from ident.trials.trial import Trial, measure_trial
+from ident.trials.trial import Trial, measure_trial, side_of
 from sim.files.errors import InputError
 
 if TYPE_CHECKING:
@@ -82,19 +82,6 @@ def measure_all(path: Path, spec: TrialFile) -> Trials:
     if not trials:
         raise InputError(refused[0][0], refused[0][1], "a folder with a record that can be measured")
     return Trials(tuple(trials), tuple(refused), True)
-
-
-def side_of(one: Trial) -> str:
-    """To which side a trial went first."""
-    from ident.trials.measure import _most_likely, sense_of
-
-    name = "psi" if one.maneuver.horizontal else "theta"
-    if name not in one.paths:
-        return ""
-    end = float(one.paths[name].knots[-5])
-    likely = _most_likely({name: one.paths[name]}, np.linspace(one.start.time, end, 400), one.start)
-    sides = ("starboard", "port") if name == "psi" else ("bow up", "bow down")
-    return sides[0] if sense_of(likely, name) > 0 else sides[1]
 
 
 def scatter(trials: tuple[Trial, ...]) -> list[dict[str, Any]]:

@@ -60,6 +60,19 @@ class Trial:
         }
 
 
+def side_of(one: Trial) -> str:
+    """To which side a trial went first: starboard or port, bow up or bow down."""
+    name = "psi" if one.maneuver.horizontal else "theta"
+    if name not in one.paths:
+        return ""
+    at = np.linspace(one.start.time, float(one.paths[name].knots[-5]), 400)
+    base = float(one.paths[name](one.start.time)) if one.start.angle is None else one.start.angle
+    away = one.paths[name](at) - base
+    first = away[int(np.argmax(np.abs(away) > 0.3 * float(np.max(np.abs(away)))))]
+    sides = ("starboard", "port") if name == "psi" else ("bow up", "bow down")
+    return sides[0] if first > 0.0 else sides[1]
+
+
 def _borne_out(one: Recording, maneuver: Maneuver, findings: list[Finding]) -> bool:
     """Whether rudder or track say that the angle measured on has the right size."""
     headings = {one.headers.get("psi", "")}

@@ -78,6 +78,7 @@ class Validation:
     passed : Whether the run is complete and every tolerance of the case is met.
     bands : Error bands from sampled coefficients; None when none were flown.
     saturated : Actuators that lay at their limit: ``actuator``, ``limit``, ``unit``, ``share_of_time``.
+    metrics_sigma : Metric -> source -> standard error, of recorded trials.
     notes : What was left out, scaled or limited because another boat flew the case.
 
     Examples
@@ -111,6 +112,7 @@ class Validation:
     bands: Bands | None = None
     saturated: list[dict[str, Any]] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
+    metrics_sigma: dict[str, dict[str, float]] = field(default_factory=dict)
 
     @property
     def complete(self) -> bool:
@@ -195,6 +197,7 @@ class Validation:
             **({"grid": self.grid} if self.grid is not None else {}),
             "saturated": self.saturated,
             "notes": self.notes,
+            **({"metrics_sigma": self.metrics_sigma} if self.metrics_sigma else {}),
             "trim_limited": list(trim.limited) if trim else [],
             "ends_s": float(self.simulation.end[0]),
             "passed": self.passed,

@@ -11,17 +11,19 @@ from numpy.typing import NDArray
 
 from ident.metrics.measure import measured
 from ident.text import on_screen
+from ident.trials.spec import load_spec
 from ident.validation.boats import Boat, Fleet
 from ident.validation.coverage import outside_tables
 from ident.validation.other_boat import Asked, check_answers, for_boat, saturated
 from ident.validation.result import ChannelError, Validation
 from ident.validation.sweep import with_grid
+from ident.validation.trial_reference import DRIVEN, TRIAL, Referenced, is_long, referenced, smoothed, with_trial
 from sim.boat.database import axis_columns, version_words
 from sim.boat.vehicle import load_vehicle
 from sim.files.errors import InputError
 from sim.files.record import Record
 from sim.files.schema import FrameData
-from sim.flight.case import Case, Reference, Series, load_case, load_reference, read_series
+from sim.flight.case import Case, Reference, Series, load_case, read_series
 from sim.flight.simulate import CHANNELS, Simulation, fly
 
 if TYPE_CHECKING:
@@ -139,10 +141,13 @@ def errors(
     if case.reference is None:
         return found
     published = reference[case.reference.published_model or ""]
-    for source in case.reference.compare:
-        flown = own.get(source, simulation)
-        found[source] = {
-            channel: _error(flown, reference, source, channel, published)
+    flown = {source: own.get(source, simulation) for source in case.reference.compare}
+    if DRIVEN in own:
+        flown[DRIVEN] = own[DRIVEN]
+    for label, flight in flown.items():
+        source = TRIAL if label == DRIVEN else label
+        found[label] = {
+            channel: _error(flight, reference, source, channel, published)
             for channel in case.reference.channels
             if channel in reference[source]
         }
@@ -163,7 +168,7 @@ def _passed(case: Case, found: dict[str, dict[str, ChannelError]]) -> bool:
     return True
 
 
-def _with_reference(case: Case, path: Path, frame: str | None) -> tuple[Case, Series]:
+def _with_reference(case: Case, path: Path, frame: str | None, trial: str | os.PathLike[str] | None) -> Referenced:
     """A case held against a user's own reference file, every channel that the simulation has.
 
     Parameters
@@ -179,6 +184,9 @@ def _with_reference(case: Case, path: Path, frame: str | None) -> tuple[Case, Se
     declared = case.reference.frame if case.reference and not frame else _FRAMES[frame or "program"]
     if not path.is_file():
         raise InputError(str(path), "no such file", "a CSV file: source, channel, t or s, value, unit")
+    if trial is not None or not is_long(path):
+        spec = load_spec(Path(trial) if trial else None)
+        return with_trial(case, path, spec.model_copy(update={"frame": _FRAMES[frame]}) if frame else spec, False)
     header = path.read_bytes().partition(b"\n")[0].strip().split(b",")
     abscissa: Literal["t", "s"] = "s" if b"s" in header and b"t" not in header else "t"
     series = read_series(path, abscissa, declared.declared(f"case {case.name}, key reference.frame"))
@@ -197,7 +205,7 @@ def _with_reference(case: Case, path: Path, frame: str | None) -> tuple[Case, Se
         frame=declared,
         initial={k: v for k, v in (case.reference.initial if case.reference else {}).items() if k in compare},
     )
-    return case.model_copy(update={"reference": reference, "tolerance": []}), series
+    return Referenced(case.model_copy(update={"reference": reference, "tolerance": []}), smoothed(series))
 
 
 def validate(
@@ -208,6 +216,7 @@ def validate(
     vehicle: str | os.PathLike[str] | None = None,
     reference: str | os.PathLike[str] | None = None,
     frame: str | None = None,
+    trial: str | os.PathLike[str] | None = None,
     speed: float | None = None,
     depth: float | None = None,
     angle: float | None = None,
@@ -220,10 +229,11 @@ def validate(
     case : Bundled case or path to a case file.
     db, version : Folder or URL of the database, and version, latest when None.
     vehicle : Bundled vehicle or path to a vehicle file, instead of the case's.
-    reference : CSV file of your own series instead of the case's: source, channel, t or s,
-        value, unit, and sigma where it is known.
+    reference : Your own reference instead of the case's: a recorded trial as ``ident trial`` reads it, or
+        a CSV of source, channel, t or s, value, unit, and sigma where it is known.
     frame : Frame of ``reference``: ``source`` (x aft, z up) or ``program`` (x forward, z down);
         the case's when None.
+    trial : ``trial.toml`` with what ``reference``, then a recorded trial, does not say of itself.
     speed, depth, angle : Speed [m/s], depth of the sail top [m] and plane angle [deg] instead of the
         case's; references then do not apply.
     fleet : The database version, where more than one case is flown from it.
@@ -250,12 +260,15 @@ def validate(
     ship = load_vehicle(os.fspath(vehicle)) if vehicle else load_vehicle(flown.vehicle, beside=where)
     flown, notes = for_boat(flown, where, ship, Asked(speed, depth, angle))
     if reference is not None:
-        flown, series = _with_reference(flown, Path(reference), frame)
+        held = _with_reference(flown, Path(reference), frame, trial)
     else:
-        series = load_reference(flown, where)
+        held = referenced(flown, where)
+    flown, series = held.case, held.series
     check_reference(flown, series, where)
     boat = (fleet or Fleet(os.fspath(db), version)).boat(ship)
     simulation, as_started = flights(flown, boat)
+    if held.driven is not None:
+        as_started[DRIVEN] = fly(held.driven, ship, boat.model(held.driven), boat.water(held.driven))
     for one in (simulation, *as_started.values()):
         if len(one["t"]) < 2:
             found_at = f"the run ends at {one.end[0]:.3f} s, before a second record"
@@ -285,7 +298,8 @@ def validate(
         in_waves=found_on.in_waves,
         passed=bool(_complete(simulation) and met),
         saturated=saturated(simulation, flown, ship),
-        notes=notes,
+        notes=[*notes, *held.notes],
+        metrics_sigma={k: v for k, v in held.sigma.items() if k in found_on.metrics},
     )
 
 

@@ -199,6 +199,8 @@ class Reference(Data):
     ----------
     file : CSV of the series (source, channel, t or s, value, unit, sigma), beside the case; without it
         users bring their own.
+    trial : Statements on ``file`` (``docs/trials.md``), which is then a recorded trial.
+    controls : ``recorded`` flies the trial's rudder or planes and revolutions instead of the command laws.
     published_model : Source in it that is another model, and so no reference.
     compare : Sources that the flight is held against.
     channels : Channels that are compared.
@@ -210,6 +212,8 @@ class Reference(Data):
     """
 
     file: str | None = None
+    trial: str | None = None
+    controls: Literal["command", "recorded"] = "command"
     published_model: str | None = None
     compare: list[str] = Field(default_factory=list)
     channels: list[str] = Field(default_factory=list)
@@ -345,6 +349,11 @@ class Series:
     def __init__(self, data: dict[str, dict[str, Record]], abscissa: Literal["t", "s"] = "t") -> None:
         self.data = data
         self.abscissa = abscissa
+        self.smooth: dict[str, dict[str, Record]] = {}
+
+    def measured_on(self, source: str) -> dict[str, Record]:
+        """What metrics are measured on: smooth paths where the series of a source are noisy."""
+        return self.smooth.get(source, self[source])
 
     def __getitem__(self, source: str) -> dict[str, Record]:
         return self.data.get(source, {})
