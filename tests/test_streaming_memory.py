@@ -97,13 +97,3 @@ def test_a_line_without_end_is_refused_before_it_is_held(tmp_path):
     peak = tracemalloc.get_traced_memory()[1] / MEGABYTE
     tracemalloc.stop()
     assert peak < 40.0
-
-
-def test_a_history_read_as_a_table_of_runs_is_refused(tmp_path):
-    folder = campaign(tmp_path)
-    with (folder / "run.csv").open("w") as stream:
-        stream.write("run_id,test,part,quality,source,U_mps,D0_m,X_N,rel_sigma\n")
-        for k in range(100_001):
-            stream.write(f"{k},towing,hull,ok,a,2,25,1,0.1\n")
-    with pytest.raises(InputError, match="time history is declared"):
-        read_campaign(folder)
