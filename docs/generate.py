@@ -71,7 +71,7 @@ def provenance(board: dict[str, Any]) -> str:
         case = next(c for c in board["cases"] if c.get("vehicle") == name)
         parent = case["parent"]
         before = f"from version {parent['version']} (`{parent['digest'][:16]}`)" if parent else "no parent"
-        source = f"trained on {', '.join(trained)}" if trained else "captive-only, trained on no maneuver"
+        source = f"trained on {', '.join(trained)}" if trained else "predicted or as published, trained on no maneuver"
         database = case["database"]
         lines.append(f"* `{name}`: version {database['version']} (`{database['digest'][:16]}`), {before}, {source}.")
     ratios = [board[k] for k in ("geometric_mean_ratio", "geometric_mean_ratio_to_parent")]
@@ -79,21 +79,26 @@ def provenance(board: dict[str, Any]) -> str:
         [f"{kind} cases", *["-" if ratio[kind] is None else f"{ratio[kind]:.2f}" for ratio in ratios]]
         for kind in ("trained", "untrained")
     ]
-    header = ["geometric mean of the error ratios", "to the published model", "to the parent version"]
+    of = board["geometric_mean_ratio_of"]
+    versions = [["all cases", *["-" if x is None else f"{x:.2f}" for x in of.values()]]]
+    columns = table(["to the published model", *[k.replace("_", " ") for k in of]], versions)
+    header = ["geometric mean of the error ratios, calibrated", "to the published model", "to the predicted version"]
     worst = board["worst_ratio"]
     place = f"{worst['case']}, {worst['source']}, `{worst['channel']}`"
-    return "\n".join([*lines, "", table(header, means), "", f"Worst ratio: {worst['ratio']:.2f} ({place})."])
+    return "\n".join(
+        [*lines, "", columns, "", table(header, means), "", f"Worst ratio: {worst['ratio']:.2f} ({place})."]
+    )
 
 
 def accuracy(board: dict[str, Any]) -> str:
     """Errors of every case beside the parent version and the published model, and the metrics of the main one."""
-    keys = ("rmse", "parent_rmse", "published_model_rmse", "ratio", "ratio_to_parent")
+    keys = ("measured_only_rmse", "parent_rmse", "rmse", "published_model_rmse", "ratio", "ratio_to_parent")
     errors = [
         [case["case"], source, f"`{channel}`", e["unit"], *[number(e[k]) for k in keys], yes_no(case["trained"])]
         for case, source, channel, e in entries(board["cases"])
     ]
-    header = ["case", "reference", "channel", "unit", "RMSE", "parent", "published model"]
-    header += ["ratio", "to parent", "trained"]
+    header = ["case", "reference", "channel", "unit", "measured only", "predicted", "calibrated", "published model"]
+    header += ["ratio", "to predicted", "trained"]
     labels = ["simulated", "EXP", "CFD", "published_model"]
     main_case = next(case for case in board["cases"] if case["case"] == CASE)
     metrics = [

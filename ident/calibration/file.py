@@ -32,6 +32,8 @@ Mask = NDArray[np.bool_]
 Positive = Annotated[float, Field(gt=0)]
 # A multiplier further than this many captive standard errors from one needs another reason.
 ALLOWED = 2.0
+# What the column ``estimated_by`` says of an estimate that a prior would bring in once more.
+_IN_FORCE = {"carry_over": "carry_over x", "tail_downwash": "downwash x"}
 
 
 class Training(Data):
@@ -59,10 +61,11 @@ class Training(Data):
 class Prior(Data):
     """What is known of a multiplier or offset before any maneuver.
 
-    ``captive``: one (or no offset) within the captive error of the group. ``carry_over``: the
-    vortex-lattice factor on force or roll moment of the plane geometry. ``tail_downwash``:
-    factor on force or pitch moment of the sail planes by their vortices at the stern planes.
-    ``stated``: mean and sigma with their reason. ``sigma`` widens the others where given.
+    ``version``: one (or no offset) within the error that the version states of the group, of runs and
+    estimates together; ``captive`` is its older name. ``carry_over``: the vortex-lattice factor on force or
+    roll moment of the plane geometry. ``tail_downwash``: factor on force or pitch moment of the sail planes by their
+    vortices at the stern planes; both for a version of the runs alone. ``stated``: mean and sigma with their
+    reason. ``sigma`` widens the others where given.
 
     Attributes
     ----------
@@ -73,7 +76,7 @@ class Prior(Data):
     source : Its reason.
     """
 
-    method: Literal["captive", "carry_over", "tail_downwash", "stated"]
+    method: Literal["version", "captive", "carry_over", "tail_downwash", "stated"]
     mean: float | None = None
     sigma: Positive | None = None
     of: Literal["force", "roll", "pitch"] = "force"
@@ -90,7 +93,8 @@ class Group(Data):
     """Tabulated values that share one multiplier or offset.
 
     ``terms`` and ``parts`` are shell patterns; ``nonzero`` lists axes whose value must not
-    be zero, such as beta for what drift adds.
+    be zero, such as beta for what drift adds; ``at_least`` gives axes whose size must not be less, in the
+    database's unit, such as delta for planes beyond an angle.
 
     Attributes
     ----------
@@ -99,6 +103,7 @@ class Group(Data):
     terms : Shell patterns of coefficients.
     parts : Shell patterns of parts.
     nonzero : Axes whose value is not zero in the values of the group.
+    at_least : Axis -> least size, in the database's unit.
     kind : One ``multiplier`` or one ``offset`` for all of them.
     prior : What is known before any maneuver.
     """
@@ -108,6 +113,7 @@ class Group(Data):
     terms: Annotated[list[str], Field(min_length=1)]
     parts: list[str] = Field(default_factory=lambda: ["*"])
     nonzero: list[str] = Field(default_factory=list)
+    at_least: dict[str, Positive] = Field(default_factory=dict)
     kind: Literal["multiplier", "offset"] = "multiplier"
     prior: Prior
 
@@ -121,11 +127,15 @@ class Group(Data):
 class CalibrationFile(Data):
     """A calibration file.
 
+    ``starts_from``: ``version``, the version as it is; ``runs``, what the runs alone gave in it, so that
+    estimates come in as priors.
+
     Attributes
     ----------
     name : Of the calibration.
     vehicle : Bundled vehicle, or a vehicle file beside this one.
     source : Where the training data come from.
+    starts_from : See above.
     training : Series that are learnt from.
     group : Coefficients that share a multiplier or offset.
     """
@@ -133,6 +143,7 @@ class CalibrationFile(Data):
     name: str
     vehicle: str
     source: str
+    starts_from: Literal["version", "runs"] = "version"
     training: Annotated[list[Training], Field(min_length=1)]
     group: Annotated[list[Group], Field(min_length=1)]
 
@@ -209,11 +220,14 @@ def _rows_of(group: Group, rows: pd.DataFrame, where: str) -> Mask:
     chosen = np.array([any(fnmatchcase(n, t) for t in group.terms) for n in names])
     chosen &= np.array([any(fnmatchcase(p, t) for t in group.parts) for p in parts])
     columns = {axis: column for column, axis in axis_columns().items()}
-    for axis in group.nonzero:
+    least = dict.fromkeys(group.nonzero, 0.0) | group.at_least
+    for axis, size in least.items():
         if axis not in catalogue.axes():
             allowed = ", ".join(catalogue.axes())
-            raise InputError(f"{where}, group {group.name}, key nonzero", repr(axis), allowed)
-        chosen &= (rows[columns[axis]].fillna(0.0) != 0.0).to_numpy()
+            key = "nonzero" if axis in group.nonzero else "at_least"
+            raise InputError(f"{where}, group {group.name}, key {key}", repr(axis), allowed)
+        found = rows[columns[axis]].fillna(0.0).abs()
+        chosen &= ((found >= size) & (found > 0.0)).to_numpy()
     if not chosen.any():
         text = "terms and parts that the database version holds"
         raise InputError(f"{where}, group {group.name}", f"no value matches {' '.join(group.terms)}", text)
@@ -260,12 +274,17 @@ def _estimated(prior: Prior, vehicle: Vehicle, rows: pd.DataFrame) -> tuple[floa
     return tail.moment_factor, tail.moment_sigma, tail.method
 
 
-def _prior(group: Group, captive: float, vehicle: Vehicle, rows: pd.DataFrame, where: str) -> tuple[float, float, str]:
+def _prior(
+    group: Group, captive: float, vehicle: Vehicle, rows: pd.DataFrame, chosen: Mask, where: str
+) -> tuple[float, float, str]:
     prior = group.prior
-    mean, sigma, method = 1.0 if group.kind == "multiplier" else 0.0, captive, "captive standard error"
+    mean, sigma, method = 1.0 if group.kind == "multiplier" else 0.0, captive, "standard error of the version"
     if prior.method == "stated":
         mean, sigma, method = float(prior.mean or 0.0), float(prior.sigma or 0.0), "stated"
-    elif prior.method != "captive":
+    elif prior.method not in ("version", "captive"):
+        if rows.loc[chosen, "estimated_by"].str.contains(_IN_FORCE[prior.method]).any():
+            text = 'method = "version": its values have the estimate in them'
+            raise InputError(f"{where}, group {group.name}, key prior.method", repr(prior.method), text)
         mean, spread, method = _estimated(prior, vehicle, rows)
         sigma = float(np.hypot(spread, mean * captive))
     if prior.sigma is not None and prior.method != "stated":
@@ -294,7 +313,7 @@ def parameters(spec: CalibrationFile, vehicle: Vehicle, rows: pd.DataFrame, wher
         chosen = _rows_of(group, rows, where)
         _whole_estimates(group, rows, chosen, where)
         captive = captive_sigma(rows, chosen, group.kind)
-        mean, sigma, method = _prior(group, captive, vehicle, rows, where)
+        mean, sigma, method = _prior(group, captive, vehicle, rows, chosen, where)
         found.append(Parameter(group, chosen, mean, sigma, captive, method))
     return found
 

@@ -17,6 +17,7 @@ from ident.calibration.estimate import calibrate as most_probable
 from ident.calibration.file import Parameter, apply, load_calibration, parameters
 from ident.database.lock import WAIT
 from ident.database.store import commit, digest
+from ident.estimates.draft import measured_rows
 from ident.output import html_table
 from ident.text import on_screen
 from sim.boat.database import NUMBERS, Version, column_order, own_version, read_rows, versions
@@ -303,6 +304,8 @@ def calibrate(
     vehicle = load_vehicle(spec.vehicle, beside=where)
     base = captive_version(db, vehicle.name, version)
     rows, _ = read_rows(db, base.number, vehicle.name)
+    if spec.starts_from == "runs":
+        rows = measured_rows(rows)
     chosen = parameters(spec, vehicle, rows, where)
     task = problem(spec, where, vehicle, rows, chosen)
     estimate = most_probable(task, workers, each)

@@ -241,6 +241,52 @@ class Tables(Data):
         return {k: v for k, v in self.model_dump().items() if v}
 
 
+class PureYaw(Data):
+    """Pure yaw that is no measurement, but pure pitch turned by axisymmetry.
+
+    With forward speed it is then estimated (``ident.estimates.turning``).
+
+    Attributes
+    ----------
+    taken_off, sigma : Share of it that the source had taken off its loads at the rotating arm before it
+        published them, from 0 to 1, and the standard deviation of what is known of that.
+    source : Where this is said.
+    """
+
+    taken_off: Annotated[float, Field(ge=0, le=1)]
+    sigma: Annotated[float, Field(ge=0, le=1)]
+    source: str
+
+
+class SharedError(Data):
+    """An error that all runs of some tests have in common: a grid, a normalisation, a balance.
+
+    The standard errors of runs do not hold it, for they average out over runs; the predicted version adds it.
+
+    Attributes
+    ----------
+    name : Of the error.
+    tests, parts, loads : Which loads share it; all where empty.
+    relative : Standard deviation, of the load.
+    source : Where this is said.
+    """
+
+    name: str
+    tests: list[str] = Field(default_factory=list)
+    parts: list[str] = Field(default_factory=list)
+    loads: list[str] = Field(default_factory=list)
+    relative: Annotated[float, Field(gt=0, le=1)]
+    source: str
+
+    @field_validator("loads")
+    @classmethod
+    def _components(cls, given: list[str]) -> list[str]:
+        for name in given:
+            if name not in OUTPUTS:
+                raise ValueError(f"components {' '.join(OUTPUTS)}, not {name}")
+        return given
+
+
 class CampaignFile(Data):
     """Schema of ``campaign.toml``.
 
@@ -282,6 +328,8 @@ class CampaignFile(Data):
     hydrostatics: Hydrostatics | None = None
     absent: dict[str, Annotated[str, Field(min_length=1, max_length=500)]] = Field(default_factory=dict)
     tables: Tables = Field(default_factory=Tables)
+    pure_yaw: PureYaw | None = None
+    shared_error: list[SharedError] = Field(default_factory=list)
     source: list[Source] = Field(default_factory=list)
 
 

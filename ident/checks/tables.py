@@ -251,6 +251,9 @@ def unsupported_terms(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
     absent: dict[str, list[str]] = {}
     copied: dict[str, list[str]] = {}
     for term in vehicle_terms(campaign.vehicle):
+        if not term.tests:
+            # An estimate gives it, no run can.
+            continue
         keys = {(m.name, m.part) for k, m in solver.mirrors.items() if k[0] == term.name}
         keys |= {(term.name, part) for part in parts_of(term, campaign.vehicle)}
         idle = all(vanishes(term, part, campaign.vehicle) for part in parts_of(term, campaign.vehicle))

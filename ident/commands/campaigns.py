@@ -20,11 +20,23 @@ from ident.text import on_screen
     "--force", default="", metavar="REASON", help="Fit in spite of errors of ident check; the reason is stored."
 )
 @WAIT
-def fit(folder: Path, db: str, message: str, json_path: str | None, force: str, wait: float) -> None:
+@click.option("--measured-only", is_flag=True, help="What the runs give, without any estimate.")
+@click.option("--without", multiple=True, metavar="ESTIMATE", help="Leave a named estimate out; may be repeated.")
+def fit(
+    folder: Path,
+    db: str,
+    message: str,
+    json_path: str | None,
+    force: str,
+    wait: float,
+    measured_only: bool,
+    without: tuple[str, ...],
+) -> None:
     """Identify the coefficients of a campaign and commit one database version.
 
     FOLDER holds campaign.toml and one CSV a test, or such folders. Nothing is committed while ident check
-    finds an error, unless --force says why; the reason stands in the version.
+    finds an error, unless --force says why; the reason stands in the version. What the runs do not say, named
+    estimates do (docs/prediction.md); no maneuver is used.
 
     \b
     Example: ident fit raw_captive_data/ --db coeff_db
@@ -34,7 +46,7 @@ def fit(folder: Path, db: str, message: str, json_path: str | None, force: str, 
 
     console = console_for(quiet=json_path == "-")
     with told() as tell:
-        done = ident.fit(folder, db, message, force, wait, tell)
+        done = ident.fit(folder, db, message, force, wait, tell, measured_only, without)
     for one in done:
         show(one, console)
     if json_path:

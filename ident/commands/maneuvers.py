@@ -28,6 +28,9 @@ if TYPE_CHECKING:
 @click.option("--strict", is_flag=True, help="Exit 1 when a tolerance of a case file is missed.")
 @click.option("--samples", type=click.IntRange(min=2), default=None, help="Draw so many coefficient sets; error bands.")
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Seed of the draws.")
+@click.option(
+    "--without", "left_out", multiple=True, metavar="NAME", help="Fly without a term or an estimate; may be repeated."
+)
 @click.option("--dask", default=None, metavar="ADDRESS", help="With --samples: fly them on a Dask cluster.")
 @click.option("--vehicle", default=None, help="With --case: bundled vehicle or vehicle file, not the case's.")
 @click.option("--speed", type=click.FloatRange(min=0, min_open=True), default=None, help="With --case: U [m/s].")
@@ -58,6 +61,7 @@ def validate(
     samples: int | None,
     seed: int,
     dask: str | None,
+    left_out: tuple[str, ...],
     **own: Any,
 ) -> None:
     """Fly a maneuver from the database and compare it with its references.
@@ -65,17 +69,19 @@ def validate(
     \b
     Example: ident validate --case hzz20 --json -
              ident validate --case hzz20 --samples 1000
+             ident validate --case hzz20 --without N_cross --without even_loads
              ident validate --case hzz20 --samples 100000 --dask tcp://scheduler:8786
              ident validate --case turn20-4m --reference mine.csv --frame program
              ident validate --case turning-circle --vehicle my_boat.toml --speed 1.5 --angle 15
              ident validate --all
+             ident validate --all --samples 200
     """
     if case == "":
         raise click.UsageError("--case is empty; give the name of a case or the path of a case file")
     if (case is None) == (not every):
         raise click.UsageError("give either --case NAME or --all")
-    if every and (samples or any(own.values())):
-        raise click.UsageError("--samples, --vehicle, --speed, --depth, --angle, --reference, --frame go with --case")
+    if every and any(own.values()):
+        raise click.UsageError("--vehicle, --speed, --depth, --angle, --reference, --frame go with --case")
     if cases and not every:
         raise click.UsageError("--cases goes with --all")
     if dask and not samples:
@@ -86,18 +92,24 @@ def validate(
         raise click.UsageError("--trial goes with --reference")
     console = console_for(quiet=json_path == "-")
     with equilibrium_of(case or "of --all"):
-        done, board = ([_one(case, db, version, own, console)], None) if case else _all(db, version, cases, console)
+        done, board = (
+            ([_one(case, db, version, own, left_out, console)], None)
+            if case
+            else _all(db, version, cases, left_out, console)
+        )
     from ident.validation.figures import case_figure
 
     if samples:
-        done = [_with_bands(done[0], samples, seed, dask, console)]
+        done = _with_bands(done, samples, seed, dask, console)
+        board = board and _board_with_bands(board, done, out, console)
     for one in done:
         figure = case_figure(one, out / f"{in_file_name(one.case.name)}_v{one.version}.png", one.bands)
         console.print(f"figure: {on_screen(figure)}", highlight=False)
     for figure in _sea_figures(done, out):
         console.print(f"figure: {on_screen(figure)}", highlight=False)
     if json_path:
-        emit(done[0].to_dict() if board is None else board, json_path)
+        result = done[0].to_dict() if board is None else board
+        emit(result | ({"without": list(left_out)} if left_out else {}), json_path)
     unfinished = [one.case.name for one in done if not one.complete]
     if unfinished:
         click.echo(f"left the finite numbers: {', '.join(map(visible, unfinished))}", err=True)
@@ -115,38 +127,66 @@ def _sea_figures(done: list[Validation], out: Path) -> list[Path]:
     return [figure for one in done for figure in sea_figures(one, out)] + harmonics_over_depth(done, out)
 
 
-def _one(case: str, db: str, version: int | None, own: dict[str, Any], console: Any) -> Validation:
+def _one(
+    case: str, db: str, version: int | None, own: dict[str, Any], left_out: tuple[str, ...], console: Any
+) -> Validation:
     import ident
     from ident.validation.validate import show
 
     with console.status("flying the case (the first run on a machine compiles: half a minute, in waves two)"):
-        done = ident.validate(case, db, version, **own)
+        done = ident.validate(case, db, version, without=left_out, **own)
     show(done, console)
     return done
 
 
-def _with_bands(one: Validation, samples: int, seed: int, dask: str | None, console: Any) -> Validation:
-    """Fly the samples with a progress bar, and print what they say."""
+def _with_bands(done: list[Validation], samples: int, seed: int, dask: str | None, console: Any) -> list[Validation]:
+    """Fly the samples of every case with a progress bar, and print what they say."""
     from rich.progress import Progress
 
     from ident.validation.bands import show
+    from ident.validation.reliability import show_coverage, show_intervals
 
+    found = []
     with Progress(console=console, transient=True) as progress:
-        task = progress.add_task("flying samples", total=samples)
-
-        def each(done: int) -> None:
-            progress.advance(task, done)
-
-        found = one.with_bands(samples, seed, each, dask)
-    show(found.to_dict()["bands"], console)
+        task = progress.add_task("flying samples", total=samples * len(done))
+        for one in done:
+            found.append(one.with_bands(samples, seed, lambda flown: progress.advance(task, flown), dask))
+    for flown in found:
+        result = flown.to_dict()
+        if len(found) == 1:
+            show(result["bands"], console)
+        console.print(f"[bold]{flown.case.name}[/]", highlight=False)
+        show_intervals(result["metrics"], console)
+        show_coverage(result["coverage"], "references", console)
     return found
 
 
-def _all(db: str, version: int | None, cases: Path | None, console: Any) -> tuple[list[Validation], dict[str, Any]]:
+def _board_with_bands(board: dict[str, Any], done: list[Validation], out: Path, console: Any) -> dict[str, Any]:
+    """The board with bands and coverage case by case and over all references; draws the reliability diagram."""
+    from ident.validation import reliability as reliable
+
+    by_name = {one.case.name: one.to_dict() for one in done}
+    keys = ("bands", "coverage", "metrics")
+    cases = [case | {k: by_name[case["case"]][k] for k in keys if case["case"] in by_name} for case in board["cases"]]
+    ranks = [r for one in done if one.bands for r in reliable.ranks(one.bands, one.case, one.reference)]
+    coverage = reliable.mean_shares(case["bands"]["inside"] for case in by_name.values())
+    points = reliable.reliability(ranks)
+    reliable.show_coverage(coverage, "all references", console)
+    if points:
+        path = out / f"reliability_v{board['database']['version']}.png"
+        console.print(f"figure: {reliable.reliability_figure(points, path)}", highlight=False)
+    return board | {"cases": cases, "coverage": coverage, "reliability": points}
+
+
+def _all(
+    db: str, version: int | None, cases: Path | None, left_out: tuple[str, ...], console: Any
+) -> tuple[list[Validation], dict[str, Any]]:
     from ident.validation.scoreboard import run_all, show
 
     with console.status("flying") as status:
-        board, done = run_all(db, version, cases, lambda name: status.update(f"flying {on_screen(name)}"))
+        board, done = run_all(
+            db, version, cases, lambda name: status.update(f"flying {on_screen(name)}"), left_out=left_out
+        )
     show(board, console)
     return done, board
 

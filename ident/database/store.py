@@ -20,6 +20,7 @@ from ident.database.lock import WAIT, held
 from ident.identification.identify import Identification
 from sim.boat.database import (
     NUMBERS,
+    OPTIONAL,
     axis_columns,
     column_order,
     column_type,
@@ -88,6 +89,8 @@ def database_rows(found: Identification) -> pd.DataFrame:
                     "n_runs": len(set(node.runs)) if sign else 0,
                     "quality": max(node.qualities, key=lambda q: factor[q]) if sign else "",
                     "origin": origin if sign else "symmetry",
+                    "estimated_by": "",
+                    "measured_correlation": "",
                     "calibration": "",
                     "estimate": index if sign else -1,
                     "correlation": correlated.get(index, "") if sign else "",
@@ -111,7 +114,7 @@ def database_rows(found: Identification) -> pd.DataFrame:
 def _check_finite(rows: pd.DataFrame, where: str) -> None:
     """Refuse values, errors or axis values that are not finite (axes may be empty)."""
     finite = np.isfinite(rows[list(NUMBERS)].to_numpy(dtype=float)).all(axis=1)
-    finite &= ~np.isinf(rows[list(axis_columns())].to_numpy(dtype=float)).any(axis=1)
+    finite &= ~np.isinf(rows[[*axis_columns(), *OPTIONAL]].to_numpy(dtype=float)).any(axis=1)
     if not finite.all():
         bad = rows[~finite].iloc[0]
         text = f"{bad['coefficient']} of {bad['part']} is not finite"

@@ -76,6 +76,7 @@ class CarryOver:
     incidence_factor : Load of the moving plane by hull incidence on that by its deflection.
     sail_factor, sail_sigma : Lift of the sail planes with their fixed roots.
     lift_slope : Of the moving stern plane on its own area, by the lattice [1/rad].
+    area : Of a moving stern plane [m^2].
     parts : Shares of root, hull and other fins in ``force_factor``.
     method : One line.
     """
@@ -88,6 +89,7 @@ class CarryOver:
     sail_factor: float
     sail_sigma: float
     lift_slope: float
+    area: float
     parts: dict[str, float]
     method: str
 
@@ -321,6 +323,7 @@ def carry_over(vehicle: Vehicle) -> CarryOver:
         sail_factor=wall_factor(_sail_fin(foils, wall), wall),
         sail_sigma=0.25 * abs(on_sail[0] - on_sail[1]),
         lift_slope=2.0 * best["own"] / _area(_stern_fins(foils, 0.5, middle)[0]),
+        area=_area(_stern_fins(foils, 0.5, middle)[0]),
         parts={k: best[k] for k in ("root", "hull", "others")},
         method="vortex lattice of the fins with the hull as a cylinder by images (after NACA Report 1307)",
     )

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 from collections import Counter
+from collections.abc import Collection
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,6 +18,8 @@ from ident.checks.findings import Finding
 from ident.database.lock import WAIT
 from ident.database.provenance import conversions, run_sources
 from ident.database.store import commit, database_rows, digest
+from ident.estimates.predict import Estimated, predicted
+from ident.estimates.turning import Given, Shared
 from ident.fitting.summary import summary
 from ident.identification.identify import Identification, identify
 from ident.output import Results, Tell, html_table, silent
@@ -41,6 +45,7 @@ class Fit:
     new : False when the latest version held them already.
     digest : SHA-256 of the content of the rows.
     findings : Of the quality checks, errors first.
+    estimates : What became of each named estimate; empty for a version of the runs alone.
 
     Examples
     --------
@@ -59,10 +64,11 @@ class Fit:
     new: bool
     digest: str
     findings: list[Finding]
+    estimates: list[Estimated]
 
     @property
     def coefficients(self) -> pd.DataFrame:
-        """One row a coefficient: points, measured, runs, median relative error, worst residual, quality."""
+        """One row a coefficient: points, measured, runs, estimated, median relative error, worst residual, quality."""
         import pandas as pd
 
         return pd.DataFrame(coefficient_table(self.rows)).set_index("coefficient")
@@ -77,6 +83,8 @@ class Fit:
             "digest": self.digest,
             "runs": len(self.campaign.runs),
             "conversions": conversions(self.campaign),
+            "measured_only": not self.estimates,
+            "estimates": [vars(e) for e in self.estimates],
             "coefficients": coefficient_table(self.rows),
             "unused": [dict(zip(_UNUSED, u, strict=True)) for u in self.identification.unused],
             "warnings": [{"subject": s, "message": m} for s, m in self.identification.warnings],
@@ -87,15 +95,41 @@ class Fit:
     def _repr_html_(self) -> str:
         title = f"{self.campaign.header.name}: version {self.version}, digest {self.digest[:16]}"
         table = self.coefficients
-        rows = [(name, *row[:3], f"{100 * row[3]:.1f} %", f"{row[4]:.1f}") for name, *row in table.itertuples()]
-        return html_table(title, ("coefficient", *table.columns[:5]), rows)
+        rows = [
+            (name, *row[:4], "-" if row[4] is None else f"{100 * row[4]:.1f} %", f"{row[5]:.1f}")
+            for name, *row in table.itertuples()
+        ]
+        return html_table(title, ("coefficient", *table.columns[:6]), rows)
+
+
+def given_of(campaign: Campaign) -> Given:
+    """What estimates need of a campaign beside its rows."""
+    runs, header = campaign.runs, campaign.header
+    speed: dict[str, float] = {}
+    if header.pure_yaw:
+        arm = runs[runs["test"] == "rotating_arm"]
+        speed = {str(r): float(u) for r, u in zip(arm["run_id"], arm["U"], strict=True) if math.isfinite(float(u))}
+    shared = []
+    for one in header.shared_error:
+        chosen = runs[runs["test"].isin(one.tests or runs["test"]) & runs["part"].isin(one.parts or runs["part"])]
+        if chosen.empty:
+            where = f"{header.name}, key shared_error, {one.name}"
+            raise InputError(where, f"no run of {' '.join(one.tests + one.parts)}", "tests and parts of the campaign")
+        shared.append(Shared(one.name, one.relative, frozenset(chosen["run_id"].astype(str)), tuple(one.loads)))
+    yaw = (header.pure_yaw.taken_off, header.pure_yaw.sigma) if header.pure_yaw else None
+    return Given(speed, yaw, tuple(shared))
 
 
 def metadata(
-    campaign: Campaign, found: Identification, message: str, findings: list[Finding], force: str = ""
+    campaign: Campaign,
+    found: Identification,
+    message: str,
+    findings: list[Finding],
+    estimates: list[Estimated],
+    force: str = "",
 ) -> dict[str, str]:
-    """What a commit carries beside its rows: provenance, inputs, conversions, notes of the fit."""
-    header = campaign.header
+    """What a commit carries beside its rows: provenance, inputs, conversions, estimates, notes of the fit."""
+    header, given = campaign.header, given_of(campaign)
     # A version that was fitted without an error of the checks does not carry the key.
     forced = {"forced": force.strip()} if any(f.severity == "error" for f in findings) else {}
     return (
@@ -112,6 +146,8 @@ def metadata(
             "warnings": json.dumps(found.warnings),
             "quality": json.dumps({k: q.model_dump() for k, q in header.quality.items()}),
             "checks": json.dumps([f.as_json() for f in findings]),
+            "estimates": json.dumps([vars(e) for e in estimates]),
+            "given": json.dumps({"speed": given.speed, "pure_yaw": given.pure_yaw}),
             "message": message,
         }
         | forced
@@ -126,12 +162,17 @@ def fit(
     force: str = "",
     wait: float = WAIT,
     tell: Tell = silent,
+    measured_only: bool = False,
+    without: Collection[str] = (),
 ) -> Results[Fit]:
     """Identify the coefficients of every campaign at or below a folder; commit one version each.
 
     Runs are turned to the program frame (x forward, y starboard, z down), made dimensionless and
     decoupled in order, with the errors of what was subtracted. Either every campaign can be read
     and identified, or nothing is committed.
+
+    What the runs do not say, named estimates do (``ident.estimates``): they are part of the version, and
+    every row that one has touched names it.
 
     Parameters
     ----------
@@ -142,6 +183,8 @@ def fit(
         Empty to refuse it.
     wait : How long to wait for other writers of the database [s].
     tell : Told what is done, how much of it, and of how much.
+    measured_only : Leave all estimates out.
+    without : Names of estimates to leave out.
 
     Returns
     -------
@@ -183,10 +226,14 @@ def fit(
     elif not any(f.severity == "error" for findings in checked for f in findings):
         raise InputError("--force", repr(force[:60]), "nothing: no check finds an error")
     ready = [(campaign, found, database_rows(found)) for campaign, found in zip(read, identified, strict=True)]
+    whole = [
+        (rows, []) if measured_only else predicted(campaign.vehicle, rows, given_of(campaign), without)
+        for campaign, _, rows in ready
+    ]
     done: list[Fit] = []
-    for (campaign, found, rows), findings in zip(ready, checked, strict=True):
-        version, new = commit(path_of_db, rows, metadata(campaign, found, message, findings, force), wait)
-        done.append(Fit(campaign, found, rows, version, new, digest(rows), findings))
+    for (campaign, found, _), (rows, estimates), findings in zip(ready, whole, checked, strict=True):
+        version, new = commit(path_of_db, rows, metadata(campaign, found, message, findings, estimates, force), wait)
+        done.append(Fit(campaign, found, rows, version, new, digest(rows), findings, estimates))
     return Results(done)
 
 
@@ -202,18 +249,26 @@ def coefficient_table(rows: pd.DataFrame) -> list[dict[str, Any]]:
     for name, group in rows.groupby("coefficient", sort=False):
         own = group[group["origin"].isin(["measured", "published"])]
         counted = own if not own.empty else group
+        counted = counted[counted["value"] != 0.0]
         table.append(
             {
                 "coefficient": str(name),
                 "points": len(group),
                 "measured": len(own),
                 "runs": len({r for text in group["runs"] for r in text.split()}),
+                "estimated": int(group["estimated_by"].ne("").sum()),
                 "median_relative_error": _relative_error(counted),
                 "worst_residual": float(group["worst_residual"].max()),
                 "quality": dict(Counter(q for q in counted["quality"] if q)),
             }
         )
     return table
+
+
+def _estimates_line(estimates: list[Estimated]) -> str:
+    """Which estimates stand beside the runs; why others do not is in the report."""
+    applied = [one.name for one in estimates if one.applied]
+    return f"estimates beside the runs: {', '.join(applied) or 'none applies'}" if estimates else ""
 
 
 def show(done: Fit, console: Console) -> None:
@@ -231,3 +286,5 @@ def show(done: Fit, console: Console) -> None:
     own = (done.identification, done.rows, done.findings, coefficient_table(done.rows))
     for style, line in summary(*own, last, console.width):
         console.print(Text(on_screen(line), style=style), no_wrap=True, overflow="crop")
+    if said := _estimates_line(done.estimates):
+        console.print(Text(on_screen(said)))

@@ -38,7 +38,8 @@ class Solver:
     def __init__(self, campaign: Campaign) -> None:
         self.campaign = campaign
         self.vehicle = campaign.vehicle
-        self.terms = vehicle_terms(self.vehicle)
+        # Terms that no test identifies come from estimates, after the runs.
+        self.terms = [t for t in vehicle_terms(self.vehicle) if t.tests]
         self.by_name = {t.name: t for t in self.terms}
         self.planes = {p.name: p for p in self.vehicle.planes}
         self.mirrors: dict[Key, Mirror] = {

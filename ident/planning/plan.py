@@ -293,7 +293,7 @@ def _untestable(problem: _Problem) -> dict[str, tuple[str, ...]]:
     vehicle = problem.campaign.vehicle
     reached = {p[:2] for p in (*problem.needs, *problem.solver.index)}
     found = {}
-    for term in vehicle_terms(vehicle):
+    for term in (t for t in vehicle_terms(vehicle) if t.tests):
         keys = [problem.solver.mirrors[term.name, part] for part in parts_of(term, vehicle)]
         own = {(term.name, part) for part in parts_of(term, vehicle)} | {(m.name, m.part) for m in keys}
         idle = all(vanishes(term, part, vehicle) for part in parts_of(term, vehicle))

@@ -6,13 +6,14 @@ import os
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 from scipy.special import chdtri
 
+from ident.metrics.measure import Metrics, measured
 from ident.text import on_screen
 from ident.validation.cluster import over_dask
 from ident.validation.draws import draw, scores
@@ -54,6 +55,7 @@ class Bands:
     estimates : Coefficient of each estimate.
     failed : Samples without a self-propulsion state.
     seed : Of the random generator.
+    metrics : Metrics of each sample, as ``ident.metrics.measure`` names them.
     """
 
     time: Array
@@ -64,6 +66,7 @@ class Bands:
     estimates: list[str]
     failed: int
     seed: int
+    metrics: tuple[Metrics, ...] = ()
     _edges: dict[tuple[str, str], dict[float, Array]] = field(default_factory=dict, repr=False, compare=False)
     _scores: dict[str, Array] = field(default_factory=dict, repr=False, compare=False)
 
@@ -106,6 +109,13 @@ def _row_steps(rows: pd.DataFrame, estimates: pd.DataFrame) -> tuple[NDArray[np.
     return index, np.asarray(np.where(turned, -1.0, 1.0) * rows["stderr"].to_numpy(), dtype=np.float64)
 
 
+class Flown(NamedTuple):
+    """One sample: (channels, records) by source, and the metrics of the case's own flight."""
+
+    records: dict[str, Array]
+    metrics: Metrics
+
+
 @dataclass(frozen=True)
 class Batch:
     """A case to be flown with many sets of row values; goes to other processes as it is.
@@ -125,7 +135,7 @@ class Batch:
     channels: tuple[str, ...]
     water: Water | None
 
-    def fly(self, values: Array) -> list[dict[str, Array] | None]:
+    def fly(self, values: Array) -> list[Flown | None]:
         """Fly one sample after the other.
 
         Parameters
@@ -134,9 +144,11 @@ class Batch:
 
         Returns
         -------
-        For each sample, (channels, records) by source; None without a self-propulsion state.
+        For each sample its records and metrics; None without a self-propulsion state.
         """
-        found: list[dict[str, Array] | None] = []
+        found: list[Flown | None] = []
+        # A sample is measured by itself: references and published values are the case's.
+        bare = self.flights[""].model_copy(update={"reference": None, "published": []})
         for sample in values:
             model = self.assembly.model(sample)
             try:
@@ -147,7 +159,9 @@ class Batch:
             except NoEquilibrium:
                 found.append(None)
                 continue
-            found.append({s: np.stack([one[c] for c in self.channels]) for s, one in flown.items()})
+            columns = measured(bare, flown[""], Series({}), {}).metrics
+            metrics = {name: column.get("simulated") for name, column in columns.items()}
+            found.append(Flown({s: np.stack([one[c] for c in self.channels]) for s, one in flown.items()}, metrics))
         return found
 
 
@@ -190,7 +204,7 @@ def _memory() -> float:
 
 def _over_threads(
     batch: Batch, chunks: Sequence[Array], workers: int | None
-) -> Iterator[tuple[int, list[dict[str, Array] | None]]]:
+) -> Iterator[tuple[int, list[Flown | None]]]:
     """Place of a chunk and its flights, as they are done."""
     with ThreadPoolExecutor(workers or os.cpu_count()) as pool:
         place = {pool.submit(batch.fly, chunk): i for i, chunk in enumerate(chunks)}
@@ -249,10 +263,14 @@ def fly_samples(
     shape = (len(batch.channels), samples, steps // every + 1)
     stacks = {source: np.full(shape, np.nan) for source in batch.flights}
     flown = np.zeros(samples, dtype=bool)
+    metrics: dict[int, Metrics] = {}
     for place, found in over_dask(dask, batch, chunks) if dask else _over_threads(batch, chunks, workers):
         for i, one in enumerate(found, start=place * chunk):
             flown[i] = one is not None
-            for source, record in (one or {}).items():
+            if one is None:
+                continue
+            metrics[i] = one.metrics
+            for source, record in one.records.items():
                 stacks[source][:, i, : record.shape[1]] = record
         each(len(found))
     if not flown.any():
@@ -268,6 +286,7 @@ def fly_samples(
         estimates=list(estimates["coefficient"]),
         failed=int(samples - flown.sum()),
         seed=seed,
+        metrics=tuple(metrics[i] for i in sorted(metrics)),
     )
 
 

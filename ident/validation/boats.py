@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass, field
 from functools import cached_property
 from threading import RLock
 from typing import TYPE_CHECKING
 
+from ident.estimates.ablation import without
+from ident.estimates.draft import measured_rows
 from sim.boat.coefficients import Coefficients
 from sim.boat.database import Version, last_own, read_rows, versions
 from sim.boat.mass import Environment
@@ -54,6 +57,10 @@ class Boat:
         return water_of(case, self.coefficients)
 
 
+def _has_estimates(boat: Boat) -> bool:
+    return bool(boat.rows["measured_value"].notna().any())
+
+
 class Fleet:
     """Every vehicle of a database version, and of the versions it came from.
 
@@ -63,6 +70,7 @@ class Fleet:
     ----------
     db : Database path or URL.
     version : Version number, latest when None.
+    left_out : Terms and estimates that the version is flown without.
 
     Raises
     ------
@@ -70,8 +78,9 @@ class Fleet:
         When there is no database there, or no such version.
     """
 
-    def __init__(self, db: str, version: int | None = None) -> None:
+    def __init__(self, db: str, version: int | None = None, left_out: Collection[str] = ()) -> None:
         self.db = db
+        self.left_out = left_out
         everything, self.number = read_rows(db, version)
         self._rows = {self.number: everything}
         self._boats: dict[tuple[int, str], Boat] = {}
@@ -114,6 +123,18 @@ class Fleet:
         commit = last_own(self._history, vehicle.name, int(named))
         return self._boat(vehicle, commit.number) if commit else None
 
+    def measured(self, vehicle: Vehicle) -> Boat | None:
+        """The vehicle with what the runs alone gave, from the version or its parent; None without estimates."""
+        source = next((b for b in (self.boat(vehicle), self.parent(vehicle)) if b and _has_estimates(b)), None)
+        if source is None:
+            return None
+        key = (-1, vehicle.model_dump_json())
+        with self._lock:
+            if key not in self._boats:
+                rows = measured_rows(source.rows)
+                self._boats[key] = Boat(vehicle, rows, source.commit, Coefficients(vehicle, rows))
+            return self._boats[key]
+
     def _boat(self, vehicle: Vehicle, number: int) -> Boat:
         # A vehicle file may change its numbers and keep its name.
         key = (number, vehicle.model_dump_json())
@@ -127,5 +148,7 @@ class Fleet:
                     known = ", ".join(sorted(every["vehicle"].unique()))
                     raise InputError(self.db, f"no coefficients of vehicle {vehicle.name!r}", known)
                 commit = last_own(self._history, vehicle.name, number) or self.record
+                if self.left_out and number == self.number:
+                    rows = without(vehicle, rows, commit.metadata, self.left_out, "--without")
                 self._boats[key] = Boat(vehicle, rows, commit, Coefficients(vehicle, rows))
             return self._boats[key]

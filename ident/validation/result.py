@@ -163,7 +163,8 @@ class Validation:
         Returns
         -------
         Validation
-            With ``bands``: ``bands.band(channel, "95")`` gives lower and upper edge over ``bands.time``.
+            With ``bands``: ``bands.band(channel, "95")`` gives lower and upper edge over ``bands.time``; and in
+            ``metrics`` the quantiles ``q025``, ``q50`` and ``q975`` over the samples.
 
         Raises
         ------
@@ -179,9 +180,10 @@ class Validation:
         True
         """
         from ident.validation.bands import fly_samples
+        from ident.validation.reliability import with_intervals
 
         bands = fly_samples(self.case, self.boat.vehicle, self.boat.rows, samples, seed, each=each, dask=dask)
-        return replace(self, bands=bands)
+        return replace(self, bands=bands, metrics=with_intervals(self.metrics, bands))
 
     def to_dict(self) -> dict[str, Any]:
         """The comparison for a program to read, as ``ident validate --json`` prints it."""
@@ -204,8 +206,10 @@ class Validation:
         }
         if self.bands is not None:
             from ident.validation.bands import summary
+            from ident.validation.reliability import mean_shares
 
-            found["bands"] = summary(self.bands, self.case, self.reference)
+            bands = summary(self.bands, self.case, self.reference)
+            found |= {"bands": bands, "coverage": mean_shares([bands["inside"]])}
         return found
 
     def _repr_html_(self) -> str:

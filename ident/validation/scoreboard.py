@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 import os
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -96,24 +96,51 @@ def worst(cases: list[dict[str, Any]]) -> dict[str, Any] | None:
     return dict(zip(("ratio", "case", "source", "channel"), max(rated), strict=True)) if rated else None
 
 
+def _errors_of(done: Validation, boat: Boat | None) -> dict[str, dict[str, ChannelError]]:
+    """Errors of another version of the boat in the same case; none where it does not come to the reference."""
+    if boat is None or not done.errors:
+        return {}
+    try:
+        return errors(done.case, done.reference, *flights(done.case, boat))
+    except (NoEquilibrium, InputError, CatalogueError):
+        return {}
+
+
+def _rmse(found: dict[str, dict[str, ChannelError]], source: str, channel: str) -> float | None:
+    against = found.get(source, {}).get(channel)
+    return against.rmse if against else None
+
+
 def _with_parent(done: Validation, fleet: Fleet) -> dict[str, Any]:
-    """The result with the error of the parent version beside each error of this one."""
+    """The result with the errors of the parent version and of the runs alone beside each error of this one."""
     result = done.to_dict()
     parent = fleet.parent(done.boat.vehicle)
-    flown: dict[str, dict[str, ChannelError]] = {}
-    if parent is not None and done.errors:
-        try:
-            flown = errors(done.case, done.reference, *flights(done.case, parent))
-        except (NoEquilibrium, InputError, CatalogueError):
-            # The parent does not come to where the reference is: it has no error there.
-            flown = {}
+    flown, measured = _errors_of(done, parent), _errors_of(done, fleet.measured(done.boat.vehicle))
     for _, source, channel, entry in entries([result]):
-        against = flown.get(source, {}).get(channel)
-        error = against.rmse if against else None
+        error = _rmse(flown, source, channel)
         entry["parent_rmse"] = error
         entry["ratio_to_parent"] = entry["rmse"] / error if error else None
+        entry["measured_only_rmse"] = _rmse(measured, source, channel)
     described = {"version": parent.commit.number, "digest": parent.commit.digest} if parent else None
     return result | {"parent": described}
+
+
+def three_columns(cases: list[dict[str, Any]], trained: bool) -> dict[str, float | None]:
+    """Geometric mean of the error ratios to the published model: measured only, predicted, calibrated.
+
+    Parameters
+    ----------
+    cases : Of a board.
+    trained : Whether the version is calibrated; its parent is then the predicted one.
+    """
+    found = [e for *_, e in entries(cases) if e["published_model_rmse"]]
+    keys = {"measured_only": "measured_only_rmse", "predicted": "parent_rmse" if trained else "rmse"}
+    keys |= {"calibrated": "rmse"} if trained else {}
+    ratios = {
+        name: geometric_mean([e[key] / e["published_model_rmse"] for e in found if e[key]])
+        for name, key in keys.items()
+    }
+    return {name: ratios.get(name) for name in ("measured_only", "predicted", "calibrated")}
 
 
 def _vehicle_of(name: str) -> Vehicle:
@@ -141,6 +168,7 @@ def run_all(
     folder: Path | None,
     each: Callable[[str], None] = lambda name: None,
     workers: int | None = None,
+    left_out: Collection[str] = (),
 ) -> tuple[dict[str, Any], list[Validation]]:
     """Fly every case from one version; bundled cases only of vehicles it holds.
 
@@ -150,6 +178,7 @@ def run_all(
     folder : Users' own cases beside the bundled ones.
     each : Called with the name of each case before it is flown.
     workers : Threads; all cores when None. The result does not depend on it.
+    left_out : Terms and estimates that the version is flown without.
 
     Returns
     -------
@@ -166,7 +195,7 @@ def run_all(
     InputError
         As ``ident.validation.validate.validate``.
     """
-    fleet = Fleet(db, version)
+    fleet = Fleet(db, version, left_out)
     names = _flyable(case_names(folder), fleet.vehicles)
 
     def one(name: str) -> tuple[dict[str, Any], Validation | None]:
@@ -182,6 +211,7 @@ def run_all(
         "cases": cases,
         "geometric_mean_ratio": means(cases, "ratio"),
         "geometric_mean_ratio_to_parent": means(cases, "ratio_to_parent"),
+        "geometric_mean_ratio_of": three_columns(cases, any(trained_on(boat) for boat in boats.values())),
         "trained_on": {name: trained_on(boat) for name, boat in boats.items()},
         "worst_ratio": worst(cases),
     }
@@ -200,11 +230,12 @@ def _errors_table(board: dict[str, Any]) -> Table:
     from rich.table import Table
 
     table = Table(
-        *("case", "reference", "channel", "RMSE", "parent", "published", "ratio", "to parent", "unit", "trained"),
+        *("case", "reference", "channel", "RMSE", "parent", "measured only", "published", "ratio", "to parent"),
+        *("unit", "trained"),
         title=f"Scoreboard, {version_words(board['database'])}",
     )
     for case, source, channel, e in entries(board["cases"]):
-        numbers = [_number(e[k]) for k in ("rmse", "parent_rmse", "published_model_rmse")]
+        numbers = [_number(e[k]) for k in ("rmse", "parent_rmse", "measured_only_rmse", "published_model_rmse")]
         ratios = [_ratio(e[k]) for k in ("ratio", "ratio_to_parent")]
         names = [on_screen(name) for name in (case["case"], source, channel)]
         table.add_row(*names, *numbers, *ratios, on_screen(e["unit"]), "yes" if case["trained"] else "no")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Collection
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -220,6 +221,7 @@ def validate(
     speed: float | None = None,
     depth: float | None = None,
     angle: float | None = None,
+    without: Collection[str] = (),
     fleet: Fleet | None = None,
 ) -> Validation:
     """Fly a case from a database version and hold it against its references.
@@ -236,6 +238,7 @@ def validate(
     trial : ``trial.toml`` with what ``reference``, then a recorded trial, does not say of itself.
     speed, depth, angle : Speed [m/s], depth of the sail top [m] and plane angle [deg] instead of the
         case's; references then do not apply.
+    without : Terms such as ``N_ur`` and estimates such as ``cross_flow`` that the version is flown without.
     fleet : The database version, where more than one case is flown from it.
 
     Returns
@@ -265,7 +268,7 @@ def validate(
         held = referenced(flown, where)
     flown, series = held.case, held.series
     check_reference(flown, series, where)
-    boat = (fleet or Fleet(os.fspath(db), version)).boat(ship)
+    boat = (fleet or Fleet(os.fspath(db), version, without)).boat(ship)
     simulation, as_started = flights(flown, boat)
     if held.driven is not None:
         as_started[DRIVEN] = fly(held.driven, ship, boat.model(held.driven), boat.water(held.driven))

@@ -43,8 +43,10 @@ BOAT_FEATURES = (
     *("u", "v", "w", "p", "q", "r", "|u|", "|v|", "|w|", "|p|", "|q|", "|r|"),
     *("U", "S", "sgn(v)", "sgn(w)", "alpha", "beta", "D0", "n", "|n|", "J"),
     *("up", "uq", "ur", "vp", "vq", "vr", "wp", "wq", "wr", "pq", "qr", "rp"),
-    *("v/U", "r/U"),
+    *("v/U", "r/U", "v/r", "w/q"),
 )
+# Rates below this [rad/s] have no pivot v/r or w/q: what depends on it has vanished with the rate.
+STILL = 1e-9
 PLANE_FEATURES = ("V", "delta", "deflection")
 ACCELERATIONS = ("udot", "vdot", "wdot", "pdot", "qdot", "rdot")
 
@@ -55,12 +57,13 @@ class CatalogueError(ValueError):
 
 @dataclass(frozen=True)
 class Axis:
-    """One tabulation axis: its database column, unit, and sign under the mirror."""
+    """One tabulation axis: its database column, unit, sign under the mirror, and the schema it came with."""
 
     name: str
     column: str
     unit: str
     mirror: int
+    since: int
     meaning: str
 
 
@@ -148,7 +151,10 @@ def axes() -> dict[str, Axis]:
     with (files("sim") / "data" / "axes.csv").open(encoding="utf-8") as stream:
         rows = list(csv.DictReader(stream))
     return {
-        r["axis"]: Axis(r["axis"], r["column"], r["unit"], 1 if r["mirrors"] == "+" else -1, r["meaning"]) for r in rows
+        r["axis"]: Axis(
+            r["axis"], r["column"], r["unit"], 1 if r["mirrors"] == "+" else -1, int(r["since"]), r["meaning"]
+        )
+        for r in rows
     }
 
 

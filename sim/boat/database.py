@@ -28,7 +28,14 @@ COLUMNS = {
     "stderr": "standard error of the value",
     "n_runs": "number of runs behind the value",
     "quality": "worst quality word among those runs",
-    "origin": "measured, published (given as a coefficient), mirror (port/starboard image) or symmetry (zero by it)",
+    "origin": (
+        "measured, published (given as a coefficient), mirror (port/starboard image), symmetry (zero by it) "
+        "or estimated (no run behind it)"
+    ),
+    "estimated_by": "estimates in force, with what each does to the value; empty for what the runs alone give",
+    "measured_value": "value that the runs alone give, before estimates and calibration; empty without estimates",
+    "measured_stderr": "standard error of that value; empty without estimates",
+    "measured_correlation": "correlations of that value, as in correlation; empty without estimates",
     "calibration": "group=multiplier of every calibration in force, empty for captive values",
     "estimate": "values with the same number are one estimate",
     "correlation": "estimate:coefficient of every estimate whose error is correlated with this one's",
@@ -38,6 +45,11 @@ COLUMNS = {
     "runs": "run ids behind the value",
 }
 NUMBERS = ("value", "stderr", "worst_residual")
+# Numbers that may be empty, as those of the axes.
+OPTIONAL = ("measured_value", "measured_stderr")
+# Columns that the first schema did not have: an unused one leaves the digest of a version as it was.
+_LATER = ("estimated_by", "measured_value", "measured_stderr", "measured_correlation")
+ESTIMATED = "estimated"
 COUNTS = ("n_runs", "estimate")
 
 
@@ -60,6 +72,12 @@ def column_order() -> list[str]:
     """All columns in the order they are stored."""
     first = ["vehicle", "coefficient", "part", "output"]
     return [*first, *axis_columns(), *[c for c in COLUMNS if c not in first]]
+
+
+def later_columns() -> list[str]:
+    """Columns that came after the first schema, in the order they are stored."""
+    since = {a.column for a in catalogue.axes().values() if a.since > 1}
+    return [c for c in column_order() if c in since or c in _LATER]
 
 
 def version_words(database: Mapping[str, Any]) -> str:
@@ -122,7 +140,7 @@ def check_columns(path: str, stored: Mapping[str, str]) -> None:
     InputError
         For columns that are missing, unknown or of another type.
     """
-    missing = [c for c in COLUMNS if c not in stored]
+    missing = [c for c in COLUMNS if c not in stored and c not in _LATER]
     if missing:
         raise InputError(path, f"not a coefficient database: no columns {', '.join(missing[:3])} ...", OURS)
     unknown = [c for c in stored if c not in column_order()]
@@ -136,18 +154,20 @@ def check_columns(path: str, stored: Mapping[str, str]) -> None:
 
 def column_type(column: str) -> str:
     """Type of a column, as pyarrow names it."""
-    return "double" if column in NUMBERS or column in axis_columns() else "int64" if column in COUNTS else "string"
+    number = column in NUMBERS or column in OPTIONAL or column in axis_columns()
+    return "double" if number else "int64" if column in COUNTS else "string"
 
 
 def digest(rows: pd.DataFrame, columns: Sequence[str] | None = None) -> str:
-    """SHA-256 of the content of database rows, independent of their order.
+    """SHA-256 of the content of database rows, independent of their order and of later columns they do not use.
 
     Parameters
     ----------
     rows : Rows of one vehicle.
     columns : Columns that count, in order; those of this program when None.
     """
-    return row_codec.digest(rows, column_order() if columns is None else columns)
+    unused = {c for c in later_columns() if rows[c].isna().all() or rows[c].astype(str).eq("").all()}
+    return row_codec.digest(rows, [c for c in (column_order() if columns is None else columns) if c not in unused])
 
 
 def read_rows(path: str, version: int | None = None, vehicle: str | None = None) -> tuple[pd.DataFrame, int]:
@@ -227,6 +247,8 @@ def stored_rows(log: Log, number: int) -> pd.DataFrame:
     with engine(f"{log.path}, version {number}", "cannot be read", WHOLE):
         # A version written before an axis existed has no column for it.
         rows = table.to_pyarrow_table().to_pandas().reindex(columns=column_order())
+    for column in ("estimated_by", "measured_correlation"):
+        rows[column] = rows[column].fillna("").astype(str)
     if rows["vehicle"].isna().any():
         raise InputError(f"{log.path}, version {number}", "rows without a vehicle", WHOLE)
     return rows

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from sim.boat.catalogue import Term
+from sim.boat.catalogue import STILL, Term
 from sim.boat.vehicle import Plane
 
 # Below this fraction of the speed a velocity component is the rounding of cos(90 deg).
@@ -66,6 +66,8 @@ def boat_features(
     found |= {"pq": p * q, "qr": q * r, "rp": r * p}
     found["U"] = speed
     found["v/U"], found["r/U"] = (v / speed, r / speed) if speed else (0.0, 0.0)
+    found["v/r"] = v / r if abs(r) > STILL else 0.0
+    found["w/q"] = w / q if abs(q) > STILL else 0.0
     found["S"] = math.hypot(v, w)
     found["sgn(v)"], found["sgn(w)"] = float(np.sign(v)), float(np.sign(w))
     found["alpha"] = math.atan2(w, u) if u or w else 0.0

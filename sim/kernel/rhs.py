@@ -12,7 +12,7 @@ from math import asin, atan2, cos, sin, sqrt
 
 import numpy as np
 
-from sim.boat.catalogue import BOAT_FEATURES
+from sim.boat.catalogue import BOAT_FEATURES, STILL
 from sim.compiled import inlined, outer
 from sim.kernel.inertia import accelerate, add_tank_loads
 from sim.kernel.layout import (
@@ -51,6 +51,7 @@ _SIGN_V, _SIGN_W, _ALPHA, _BETA, _DEPTH = _AT["sgn(v)"], _AT["sgn(w)"], _AT["alp
 _N, _SIZE_N, _ADVANCE = _AT["n"], _AT["|n|"], _AT["J"]
 _U_BY, _V_BY, _W_BY, _RATES = _AT["up"], _AT["vp"], _AT["wp"], _AT["pq"]
 _DRIFT, _TURN = _AT["v/U"], _AT["r/U"]
+_YAW_PIVOT, _PITCH_PIVOT = _AT["v/r"], _AT["w/q"]
 
 
 @inlined
@@ -89,6 +90,8 @@ def _fill_boat(m: np.ndarray, y: np.ndarray, at: int, ahead: float, n: float, s:
     s[_W_BY], s[_W_BY + 1], s[_W_BY + 2] = w_ * p, w_ * q, w_ * r
     s[_RATES], s[_RATES + 1], s[_RATES + 2] = p * q, q * r, r * p
     s[_DRIFT], s[_TURN] = (v / speed, r / speed) if speed > 0.0 else (0.0, 0.0)
+    s[_YAW_PIVOT] = v / r if abs(r) > STILL else 0.0
+    s[_PITCH_PIVOT] = w_ / q if abs(q) > STILL else 0.0
 
 
 @inlined

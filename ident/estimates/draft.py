@@ -1,0 +1,225 @@
+"""Rows of a version while estimates change them: values, what is left of captive errors, shared errors.
+
+An estimate has a few unknowns of its own (a factor, a drag coefficient), each with a standard
+deviation. What one standard deviation of an unknown does to every value is a ``direction``; values
+moved by the same direction share its error, so that the covariance of the version is
+
+    S R S + sum_k d_k d_k^T
+
+with S the captive errors as scaled, R their correlation, and d_k the directions.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from fnmatch import fnmatchcase
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from sim.boat import catalogue
+from sim.boat.database import ESTIMATED, NUMBERS, OPTIONAL, axis_columns, column_order, to_column
+from sim.boat.parts import vehicle_terms
+from sim.boat.row_codec import correlation_matrix, correlation_texts
+from sim.boat.vehicle import Vehicle
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+
+class NotApplicable(Exception):
+    """An estimate has nothing to work from; the text says what is missing."""
+
+
+@dataclass
+class Draft:
+    """Database rows under change.
+
+    Attributes
+    ----------
+    vehicle : Whose rows.
+    rows : As the runs gave them, then the rows that estimates added, in this order.
+    value : (n,) values as they stand.
+    scale : (n,) what is left of each captive standard error.
+    words : For each row, the estimates in force and what they did.
+    directions : Unknown of an estimate -> (n,) change of the values by one standard deviation of it.
+    memo : What more than one estimate computes from the vehicle.
+    """
+
+    vehicle: Vehicle
+    rows: pd.DataFrame
+    value: Array
+    scale: Array
+    words: list[list[str]]
+    directions: dict[str, Array]
+    memo: dict[str, object] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, vehicle: Vehicle, rows: pd.DataFrame) -> Draft:
+        """A draft of rows that no estimate has touched."""
+        own = rows.reset_index(drop=True)
+        n = len(own)
+        return cls(vehicle, own, own["value"].to_numpy(float).copy(), np.ones(n), [[] for _ in range(n)], {})
+
+    # -- which rows -------------------------------------------------------------------------
+
+    def where(self, terms: Sequence[str], parts: Sequence[str] = ("*",)) -> Mask:
+        """(n,) True where coefficient and part match any of the shell patterns."""
+        chosen = [
+            any(fnmatchcase(name, t) for t in terms) and any(fnmatchcase(part, p) for p in parts)
+            for name, part in zip(self.rows["coefficient"], self.rows["part"], strict=True)
+        ]
+        return np.array(chosen, dtype=bool)
+
+    def has(self, *terms: str) -> bool:
+        """Whether any of the coefficients has a row."""
+        return bool(self.rows["coefficient"].isin(terms).any())
+
+    def axis(self, name: str) -> Array:
+        """(n,) values along an axis as the database holds them (deg or SI); NaN where a row has none."""
+        return self.rows[catalogue.axes()[name].column].to_numpy(dtype=float)
+
+    # -- what is done to them ----------------------------------------------------------------
+
+    def multiply(self, chosen: Mask, factor: float, sigma: float, unknown: str, word: str) -> None:
+        """Multiply values, their captive errors and their directions; the factor's error is shared."""
+        base = np.where(chosen, self.value, 0.0)
+        for direction in self.directions.values():
+            direction[chosen] *= factor
+        self.value[chosen] *= factor
+        self.scale[chosen] *= factor
+        self._move(unknown, base * sigma)
+        self._say(chosen, word)
+
+    def replace(self, chosen: Mask, value: Array, word: str) -> None:
+        """Put values in the place of others, whose captive errors and directions go with them.
+
+        Parameters
+        ----------
+        chosen : (n,) rows.
+        value : (n,) new values; those of other rows are not read.
+        """
+        self.value[chosen] = value[chosen]
+        self.scale[chosen] = 0.0
+        for direction in self.directions.values():
+            direction[chosen] = 0.0
+        self._say(chosen, word)
+
+    def shift(self, chosen: Mask, change: Array, word: str) -> None:
+        """Add (n,) changes to the values; their captive errors stay."""
+        self.value[chosen] += change[chosen]
+        self._say(chosen, word)
+
+    def spread(self, unknown: str, change: Array) -> None:
+        """One standard deviation of an unknown changes the values by (n,) ``change``."""
+        self._move(unknown, np.asarray(change, dtype=float))
+
+    def add(self, term: str, points: Sequence[dict[str, float]], values: Sequence[float], word: str) -> Mask:
+        """Rows of a term that no run identifies.
+
+        Parameters
+        ----------
+        term : Symbol in the vehicle's term set, of a part other than a plane or section.
+        points : Axis name -> value in radians or SI, one a row.
+        values : One a row.
+        word : What the column ``estimated_by`` says.
+
+        Returns
+        -------
+        (n,) True at the new rows, n with them.
+        """
+        row_of = {t.name: t for t in vehicle_terms(self.vehicle)}
+        if term not in row_of:
+            raise NotApplicable(f"the term set of {self.vehicle.name} has no {term}")
+        known = row_of[term]
+        columns = {axis: column for column, axis in axis_columns().items()}
+        first = int(self.rows["estimate"].max()) + 1
+        new = []
+        for i, (point, value) in enumerate(zip(points, values, strict=True)):
+            place = {columns[a]: to_column(columns[a], point[a]) for a in known.axes}
+            new.append(
+                {
+                    **dict.fromkeys(("quality", "calibration", "correlation", "measured_correlation", "runs"), ""),
+                    **{"vehicle": self.vehicle.name, "coefficient": term, "part": known.part, "output": known.output},
+                    **place,
+                    **{"value": value, "stderr": 0.0, "worst_residual": 0.0, "n_runs": 0},
+                    **{"origin": ESTIMATED, "estimated_by": "", "estimate": first + i},
+                    "extrapolation": " ".join(f"{a}:{r}" for a, r in known.extrapolation.items()),
+                    "equation": known.equation,
+                }
+            )
+        count = len(new)
+        table = pd.DataFrame(new).reindex(columns=self.rows.columns)
+        table = table.astype({c: t for c, t in self.rows.dtypes.items() if t.kind in "fi"})
+        self.rows = pd.concat([self.rows, table], ignore_index=True)
+        self.value = np.concatenate([self.value, np.asarray(values, dtype=float)])
+        self.scale = np.concatenate([self.scale, np.zeros(count)])
+        self.words += [[word] for _ in range(count)]
+        self.directions = {k: np.concatenate([d, np.zeros(count)]) for k, d in self.directions.items()}
+        return np.arange(len(self.value)) >= len(self.value) - count
+
+    def _move(self, unknown: str, change: Array) -> None:
+        if np.any(change):
+            self.directions[unknown] = self.directions.get(unknown, np.zeros(len(self.value))) + change
+
+    def _say(self, chosen: Mask, word: str) -> None:
+        for i in np.flatnonzero(chosen):
+            self.words[i].append(word)
+
+    # -- the version ---------------------------------------------------------------------------
+
+    def finished(self) -> pd.DataFrame:
+        """The rows of the predicted version, columns as ``sim.boat.database.column_order``."""
+        out = self.rows.copy()
+        added = out["origin"].eq(ESTIMATED).to_numpy()
+        out["measured_value"] = np.where(added, np.nan, out["value"])
+        out["measured_stderr"] = np.where(added, np.nan, out["stderr"])
+        out["measured_correlation"] = np.where(added, "", out["correlation"])
+        out["value"] = self.value
+        out["estimated_by"] = ["; ".join(words) for words in self.words]
+        first, matrix = correlation_matrix(self.rows)
+        place = {int(e): i for i, e in reversed(list(enumerate(self.rows["estimate"])))}
+        at = np.array([place[int(e)] for e in first["estimate"]])
+        captive = self.scale[at] * first["stderr"].to_numpy()
+        total = np.outer(captive, captive) * matrix
+        for direction in self.directions.values():
+            total += np.outer(direction[at], direction[at])
+        return with_covariance(out, list(first["estimate"]), total)
+
+
+def with_covariance(rows: pd.DataFrame, numbers: Sequence[int], total: Array) -> pd.DataFrame:
+    """Rows with standard errors and correlations of a covariance, in the digits that are stored.
+
+    Parameters
+    ----------
+    rows : Database rows with their values.
+    numbers : (k,) estimates, in the order of ``total``.
+    total : (k, k) covariance of the estimates.
+    """
+    out = rows.copy()
+    deviation = np.sqrt(np.clip(np.diag(total), 0.0, None))
+    place = {int(e): i for i, e in enumerate(numbers)}
+    text = correlation_texts(total, [int(e) for e in numbers])
+    where = np.array([place.get(int(e), -1) for e in out["estimate"]])
+    out.loc[where >= 0, "stderr"] = deviation[where[where >= 0]]
+    out["correlation"] = [text.get(int(e), "") for e in out["estimate"]]
+    for column in (*NUMBERS, *OPTIONAL):
+        out[column] = [x if np.isnan(x) else float(f"{x:.12g}") for x in out[column]]
+    return out[column_order()]
+
+
+def measured_rows(rows: pd.DataFrame) -> pd.DataFrame:
+    """The rows that the runs alone gave, as ``ident fit --measured-only`` writes them, from a predicted version."""
+    known = rows[~rows["origin"].eq(ESTIMATED)].reset_index(drop=True)
+    given = known["measured_value"].notna()
+    return known.assign(
+        value=known["value"].where(~given, known["measured_value"]),
+        stderr=known["stderr"].where(~given, known["measured_stderr"]),
+        correlation=known["correlation"].where(~given, known["measured_correlation"]),
+        measured_value=np.nan,
+        measured_stderr=np.nan,
+        measured_correlation="",
+        estimated_by="",
+    )

@@ -1,0 +1,130 @@
+"""Loads of planes: from those on the moving plane alone to those its deflection makes on the boat.
+
+A campaign that keeps loads by part measures a moving plane without its root, the hull beside it
+and the fins behind it. ``carry_over`` and ``downwash`` give the ratios; here they come into the rows.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ident.estimates.carry_over import CarryOver, carry_over
+from ident.estimates.downwash import slopes, tail_downwash
+from ident.estimates.draft import Draft, NotApplicable
+from sim.files.errors import InputError
+
+_STERN = ("stern_plane_*",)
+# Lift of a real surface on that of a lattice, and its deviation: the boundary layer takes some per cent of the
+# slope of a section (Abbott and von Doenhoff 1959, ch. 7), and lattices are as good as that at small aspect ratio.
+_VISCOUS, _LATTICE = 0.95, 0.05
+
+
+def lift_slope(draft: Draft, planes: CarryOver) -> tuple[float, float, float]:
+    """Lift slope of the moving stern planes by runs and lattice, weighted by their variances.
+
+    A run at 10 deg may be past the straight part of a coarse grid's lift, and a lattice has no boundary layer:
+    two estimates of one number, neither of which knows of the other's fault.
+
+    Returns
+    -------
+    Factor on the measured slope, its deviation, and the measured slope on the planes' own area [1/rad].
+    """
+    rows = draft.rows
+    at = rows[rows["part"].str.startswith("stern_plane")]
+    depth, speed = float(at["depth_m"].max()), float(at["speed_mps"].max())
+    length = draft.vehicle.particulars.length.value
+    found = []
+    for plane in draft.vehicle.planes:
+        own = slopes(rows, plane.name, depth, speed) if plane.name.startswith("stern_plane") else {}
+        if {"Y", "Z"} <= set(own):
+            along = plane.lift_axis[1] * own["Y"] + plane.lift_axis[2] * own["Z"]
+            found.append(abs(along) * length**2 / planes.area)
+    if not found:
+        raise NotApplicable("no stern plane with runs on both sides of its neutral angle")
+    measured = float(np.mean(found))
+    used = at[at["coefficient"].str.match("[YZ]_d") & (at["value"] != 0.0) & (at["stderr"] > 0.0)]
+    runs = float((used["stderr"] / used["value"].abs()).median()) * measured
+    theory, wide = _VISCOUS * planes.lift_slope, _LATTICE * planes.lift_slope
+    weight = np.array([runs**-2, wide**-2])
+    mean = float(weight @ [measured, theory] / weight.sum())
+    return mean / measured, float(weight.sum() ** -0.5) / measured, measured
+
+
+def _planes(draft: Draft) -> CarryOver:
+    """Carry-over of the draft's vehicle, computed once."""
+    if "carry_over" not in draft.memo:
+        draft.memo["carry_over"] = carry_over(draft.vehicle)
+    found = draft.memo["carry_over"]
+    assert isinstance(found, CarryOver)
+    return found
+
+
+def carried_over(draft: Draft) -> str:
+    """Stern planes with root, hull and other fins; drag between the plane's own and all of it.
+
+    The normal of a deflected plane leans with it, those of root and hull do not, so that pressure drag stays on
+    the plane (factor one); drag by lift grows with all the lift (the factor of the force). Between the
+    two nothing is known: the middle, with the deviation of a uniform distribution.
+
+    Raises
+    ------
+    NotApplicable
+        Without stern planes or their geometry.
+    """
+    if not draft.where(["Z_d*", "Y_d*"], _STERN).any():
+        raise NotApplicable("no loads of stern planes by part")
+    try:
+        found = _planes(draft)
+    except InputError as error:
+        raise NotApplicable(str(error)) from error
+    lift, wide, measured = lift_slope(draft, found)
+    force, roll = found.force_factor, found.roll_factor
+    for terms, factor, sigma, unknown in (
+        (["[YZMN]_d*"], lift * force, lift * found.force_sigma, "carry_over force"),
+        (["K_d*"], lift * roll, lift * found.roll_sigma, "carry_over roll"),
+    ):
+        chosen = draft.where(terms, _STERN)
+        by_lift = np.where(chosen, draft.value, 0.0) * factor / lift * wide
+        draft.multiply(chosen, factor, sigma, unknown, f"carry_over x{factor:.3f}")
+        draft.spread("lift slope", by_lift)
+    drag, spread = 0.5 * (1.0 + force), float((force - 1.0) / np.sqrt(12.0))
+    draft.multiply(draft.where(["X_d*"], _STERN), drag, spread, "carry_over drag", f"carry_over x{drag:.3f}")
+    return (
+        f"lift slope {measured:.2f} by runs and {_VISCOUS * found.lift_slope:.2f} by lattice: "
+        f"x{lift:.3f} +- {wide:.3f}; "
+        f"force x{force:.3f} +- {found.force_sigma:.3f}, roll x{roll:.3f} +- {found.roll_sigma:.3f}, "
+        f"drag x{drag:.2f} +- {spread:.2f}"
+    )
+
+
+def sail_planes(draft: Draft) -> str:
+    """Sail planes with their roots on the sail, and what their vortices do to the stern planes.
+
+    Raises
+    ------
+    NotApplicable
+        Without sail planes, or without the geometry.
+    """
+    chosen = draft.where(["[ZM]_d*"], ["sail_planes"])
+    if not chosen.any():
+        raise NotApplicable("no loads of sail planes by part")
+    try:
+        found = tail_downwash(draft.vehicle, draft.rows, _planes(draft))
+    except (InputError, KeyError) as error:
+        raise NotApplicable(str(error)) from error
+    force, moment = float(found.force_factor), float(found.moment_factor)
+    draft.multiply(
+        draft.where(["Z_d*"], ["sail_planes"]),
+        force,
+        found.force_sigma,
+        "tail_downwash force",
+        f"downwash x{force:.3f}",
+    )
+    draft.multiply(
+        draft.where(["M_d*"], ["sail_planes"]),
+        moment,
+        found.moment_sigma,
+        "tail_downwash moment",
+        f"downwash x{moment:.3f}",
+    )
+    return f"heave x{force:.3f} +- {found.force_sigma:.3f}, pitch x{moment:.3f} +- {found.moment_sigma:.3f}"
