@@ -19,6 +19,7 @@ from sim.boat.row_codec import correlation_matrix
 from sim.files.errors import InputError
 from sim.kernel import rhs as kernel
 from sim.kernel.assemble import assemble
+from sim.kernel.layout import workspace
 
 MEASURED_ONLY = "3a58a8a6c322140b"
 
@@ -64,11 +65,11 @@ def test_shared_errors_make_a_covariance_that_can_be_drawn(version):
 
 def _loads(coefficients, environment, velocity, rates):
     model = assemble(coefficients, environment)
-    work = kernel.workspace(len(model.planes))
+    work = workspace(model)
     state = np.concatenate([velocity, rates, [0.0, 0.0, 25.0], np.zeros(3)])
-    kernel.fill_features(model, state, np.append(np.zeros(len(model.planes)), 1.0), work.features)
-    kernel.loads(model, work)
-    return work.loads[:6].copy()
+    controls = np.append(np.zeros(len(coefficients.vehicle.planes)), 1.0)
+    kernel.features(model, state, controls, work)
+    return kernel.loads(model, work)[:6].copy()
 
 
 def test_predicted_boat_is_symmetric_and_damped(campaign, version, environment):
