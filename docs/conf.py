@@ -31,7 +31,6 @@ suppress_warnings = ["config.cache"]
 
 html_theme = "furo"
 html_title = f"ident {version}"
-html_static_path = ["_static"]
 
 autodoc_member_order = "bysource"
 autodoc_typehints = "none"

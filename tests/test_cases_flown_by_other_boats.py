@@ -23,7 +23,7 @@ ROOT = Path(__file__).parents[1]
 @pytest.fixture(scope="module")
 def suboff_db(tmp_path_factory):
     path = str(tmp_path_factory.mktemp("suboff") / "coeff_db")
-    fit(ROOT / "raw_captive_data" / "suboff", path, "test", False)
+    fit(ROOT / "raw_captive_data" / "suboff", path, "test")
     return path
 
 
