@@ -83,7 +83,7 @@ def unmeasured(draft: Draft) -> str:
     if draft.vehicle.added_mass == "sections" or not draft.has("Y_vdot"):
         raise NotApplicable("no added mass of the whole boat")
     added = added_mass_matrix(Coefficients(draft.vehicle, draft.rows), _UNIT)
-    length, diameter = draft.vehicle.particulars.length.value, draft.vehicle.propeller.diameter.value
+    length, diameter = draft.vehicle.particulars.length.value, draft.vehicle.diameter
     depth = float(np.nanmax(draft.axis("D0")))
     names = []
     for term in vehicle_terms(draft.vehicle):
