@@ -36,6 +36,8 @@ model_inertia_in_loads = false
 [uncertainty]
 floor = 0.1
 source = "made up"
+[absent]
+"drift_horizontal.N" = "a made balance of two components"
 [quality]
 as_published = { factor = 1.0, meaning = "as published" }
 """

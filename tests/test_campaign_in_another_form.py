@@ -231,7 +231,7 @@ def test_tare_and_strut_are_taken_off_in_the_campaigns_frame(tmp_path):
         one(tmp_path, "X_N,Y_N", "1000,5", sources=other)
     with pytest.raises(InputError, match=r"tare\.0\.tests: 'tow'"):
         one(tmp_path, "X_N", "1000", sources=other.replace('"towing"', '"tow"'))
-    with pytest.raises(InputError, match=r"tare\.0\.loads\.X"):
+    with pytest.raises(InputError, match=r"tare\.0\.loads"):
         one(tmp_path, "X_N", "1000", sources=tare.replace("0.5 kN", "0.5 m"))
 
 

@@ -84,7 +84,7 @@ def test_command_line_takes_an_own_reference(tmp_path, fitted_db):
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("source,channel,t,value\nA,x,0,1\n", ["column unit"]),
+        ("source,channel,t,value\nA,x,0,1\n", ["mine.csv", "two rows or more"]),
         ("source,channel,t,value,unit\nA,mood,0,1,m\n", ["column channel", "mood"]),
         ("source,channel,t,value,unit\nA,x,0,1,m\nA,x,0,2,m\n", ["not increasing"]),
         ("source,channel,t,value,unit\nA,x,0,1,m\nA,x,1,2,ft\n", ["units", "ft"]),
@@ -92,11 +92,11 @@ def test_command_line_takes_an_own_reference(tmp_path, fitted_db):
         ("source,channel,t,value,unit\nA,x,0,one,m\n", ["row 2", "value", "one"]),
         ("source,channel,t,value,unit,sigma\nA,x,0,1,m,?\n", ["row 2", "sigma"]),
         ("source,channel,t,value,unit\nA,x,900,1,m\n", ["begins", "900"]),
-        ("", ["not a table"]),
+        ("", ["mine.csv", "no rows"]),
         ("source,channel,t,value,unit\nA,x,0,1,m\n,x,1,2,m\n", ["row 3", "column source", "nothing"]),
         ("source,channel,t,value,unit\nA,x,-2,1,m\nA,x,1,2,m\n", ["row 2", "column t", "-2", "zero or more"]),
         ("source,channel,t,value,unit,sigma\nA,x,0,1,m,-1\n", ["row 2", "column sigma", "-1", "zero or more"]),
-        ("\xff\xfe", ["not a table"]),
+        ("\xff\xfe", ["mine.csv", "no rows"]),
     ],
 )
 def test_mistake_in_an_own_reference_is_named(tmp_path, fitted_db, text, words):

@@ -78,7 +78,7 @@ def test_mistake_in_a_case_is_named(write, fitted_db, old, new, words):
     ("old", "new", "words"),
     [
         ("rad", "furlong", ["furlong", "rad"]),
-        ("value", "valu", ["column value missing"]),
+        ("value", "valu", ["roll_decay.csv"]),
         ("-0.076853", "nan", ["row", "column value", "nan"]),
         ("EXP,phi,", ",phi,", ["row 2", "column source", "nothing"]),
     ],

@@ -20,7 +20,8 @@ from ident.captive.quantities import table
 from ident.captive.run_table import TEXT
 from ident.checks.check import check_campaign
 from ident.database.store import database_rows
-from ident.fitting.fit import metadata
+from ident.estimates.predict import predicted
+from ident.fitting.fit import given_of, metadata
 from ident.identification.identify import identify
 from sim.files.errors import InputError
 
@@ -94,11 +95,11 @@ def outcome(folder: Path, head: dict[str, Any], files: dict[str, str]) -> dict[s
     try:
         campaign = read_campaign(folder)
         found = identify(campaign)
-        rows = database_rows(found)
+        rows, estimates = predicted(campaign.vehicle, database_rows(found), given_of(campaign))
         findings = [f.as_json() for f in check_campaign(campaign, folder)]
     except InputError as error:
         return {"refused": str(error)}
-    own = metadata(campaign, found, "", [])
+    own = metadata(campaign, found, "", [], estimates)
     noted = [found.unused, found.warnings, found.covariance.round(15).tolist()]
     return {"rows": rows.round(12).to_csv(), "noted": noted, "findings": findings, "words": own}
 
@@ -123,6 +124,9 @@ def differs(tmp_path, before, after, files=None, other=None, words=False) -> Non
 
 
 # -- the keys of campaign.toml --------------------------------------------------------------
+
+YAW = {"pure_yaw": {"taken_off": 0.5, "sigma": 0.5, "source": "made"}}
+GRID = {"shared_error": [{"name": "grid", "relative": 0.1, "source": "made"}]}
 
 INERTIA = {
     "inertia.model_inertia_in_loads": True,
@@ -155,6 +159,14 @@ HEADER_CASES: dict[str, tuple[dict[str, Any], dict[str, Any], dict[str, Any]]] =
     "CampaignFile.tare": ({}, TARE, {}),
     "CampaignFile.half_model": ({}, HALF, {"files": STRAIGHT}),
     "CampaignFile.hydrostatics": ({}, HYDRO, {}),
+    "CampaignFile.pure_yaw": ({}, YAW, {"words": True}),
+    "PureYaw.taken_off": (YAW, {**YAW, "pure_yaw.taken_off": 0.7}, {"words": True}),
+    "PureYaw.sigma": (YAW, {**YAW, "pure_yaw.sigma": 0.3}, {"words": True}),
+    "CampaignFile.shared_error": ({}, GRID, {}),
+    "SharedError.relative": (GRID, {**GRID, "shared_error.0.relative": 0.2}, {}),
+    "SharedError.loads": (GRID, {**GRID, "shared_error.0.loads": ["Y"]}, {}),
+    "SharedError.tests": (GRID, {**GRID, "shared_error.0.tests": ["towing"]}, {}),
+    "SharedError.parts": (GRID, {**GRID, "shared_error.0.parts": ["propeller"]}, {}),
     "CampaignFile.absent": ({}, {"absent": {"drift_horizontal.Y": "a balance of one component"}}, {}),
     "CampaignFile.tables": ({}, {"tables.reference": "no.csv"}, {}),
     "CampaignFile.source": ({}, {"source.0.files": "none.csv"}, {}),

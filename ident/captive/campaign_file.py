@@ -308,6 +308,8 @@ class CampaignFile(Data):
     half_model : Where only half of the body was tested.
     tables : Files beside the runs that only the checks look at.
     source : Which files hold the runs; every CSV beside this file without.
+    pure_yaw : Where pure yaw is pure pitch turned: what had been taken off published loads, with its error.
+    shared_error : Errors that all runs of some tests have in common.
     absent : Essential loads that a test does not give, with the reason:
         ``"drift_horizontal.N" = "a balance of two components"``.
     """

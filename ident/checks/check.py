@@ -29,6 +29,7 @@ from ident.checks.findings import SEVERITIES, Body, Evidence, Finding, registere
 from ident.checks.summary import counted, cut, lines
 from ident.identification.identify import Identification, identify
 from ident.output import Tell, silent
+from ident.text import on_screen
 from sim.files.errors import InputError
 
 if TYPE_CHECKING:
@@ -260,7 +261,7 @@ def show(findings: Sequence[Finding], title: str, console: Console, everything: 
     if everything and findings:
         console.print(table(findings, title))
     elif findings:
-        console.print(Text(cut(title, console.width), style="bold"))
+        console.print(Text(on_screen(cut(title, console.width)), style="bold"))
         for severity, line in lines(findings, console.width, 18):
             console.print(Text(line, style=_COLOURS.get(severity, "")), no_wrap=True, overflow="crop")
     console.print(f"quality checks: {counted(findings)}", highlight=False)

@@ -44,12 +44,13 @@ def doctor(folders: tuple[Path, ...], db: str | None, repair: bool, wait: float,
     if db is not None:
         from ident.database.doctor import examine
         from ident.database.doctor import repair as restore
+        from ident.fitting.fit import completed
 
         with console.status("examining") as status:
             if repair:
-                seen = restore(db, folders, wait, status.update)
+                seen = restore(db, folders, wait, status.update, completed)
             else:
-                seen = examine(db, folders, status.update)
+                seen = examine(db, folders, status.update, completed)
         found["database"] = seen.to_dict()
         well = well and seen.whole
         if not quiet:

@@ -171,7 +171,9 @@ def told() -> Iterator[Any]:
 
     from ident.commands.screen import Screen
 
-    with Progress(console=Screen(stderr=True), transient=True) as shown:
+    screen = Screen(stderr=True)
+    # Where nobody watches, a bar that is taken away leaves a blank line.
+    with Progress(console=screen, transient=True, disable=not screen.is_terminal) as shown:
         tasks: dict[str, TaskID] = {}
 
         def tell(what: str, done: int, of: int) -> None:

@@ -10,7 +10,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ident.captive.campaign import find_campaigns, read_campaign
+from ident.captive.campaign import Campaign, find_campaigns, read_campaign
 from ident.captive.combine import by_vehicle
 from ident.database.lock import WAIT, held
 from ident.database.store import FOR_EVER, arrow, commit_again, database_rows
@@ -74,9 +74,16 @@ class Examination:
 
 
 Rows = dict[tuple[str, str], tuple[str, "pd.DataFrame"]]
+# What a fit adds to the rows that the runs alone gave; fits stand above this room.
+Completed = Callable[[Campaign, "pd.DataFrame"], "pd.DataFrame"]
 
 
-def examine(path: str, folders: tuple[Path, ...] = (), each: Callable[[str], None] = lambda text: None) -> Examination:
+def examine(
+    path: str,
+    folders: tuple[Path, ...] = (),
+    each: Callable[[str], None] = lambda text: None,
+    completed: Completed | None = None,
+) -> Examination:
     """Read every version of a database and check every row of it.
 
     Parameters
@@ -92,7 +99,7 @@ def examine(path: str, folders: tuple[Path, ...] = (), each: Callable[[str], Non
     """
     log = Log(path, holes=True)
     faults = _faults(log, each)
-    sources = _sources(log, faults, folders) if any(faults.values()) else {}
+    sources = _sources(log, faults, folders, completed) if any(faults.values()) else {}
     seen = []
     for number, fault in faults.items():
         said = _entry(log, number)
@@ -143,7 +150,7 @@ def _wanted(log: Log, number: int) -> dict[str, str]:
     return expected if complete and "" not in expected else {}
 
 
-def _sources(log: Log, faults: dict[int, str], folders: tuple[Path, ...]) -> Rows:
+def _sources(log: Log, faults: dict[int, str], folders: tuple[Path, ...], completed: Completed | None) -> Rows:
     """(Vehicle, digest) -> where rows of that digest are, and the rows."""
     found: Rows = {}
     for number in faults:
@@ -167,12 +174,17 @@ def _sources(log: Log, faults: dict[int, str], folders: tuple[Path, ...]) -> Row
             if not same or campaign.refused:
                 continue
             rows = database_rows(identify(campaign))
-            found.setdefault((campaign.vehicle.name, digest(rows)), (f"campaign {where}", rows))
+            for one in [rows, *([completed(campaign, rows)] if completed else [])]:
+                found.setdefault((campaign.vehicle.name, digest(one)), (f"campaign {where}", one))
     return found
 
 
 def repair(
-    path: str, folders: tuple[Path, ...] = (), wait: float = WAIT, each: Callable[[str], None] = lambda text: None
+    path: str,
+    folders: tuple[Path, ...] = (),
+    wait: float = WAIT,
+    each: Callable[[str], None] = lambda text: None,
+    completed: Completed | None = None,
 ) -> Examination:
     """Restore what can be restored; damaged files are set aside, none is deleted.
 
@@ -184,8 +196,10 @@ def repair(
     Parameters
     ----------
     path : Folder of the database.
-    folders, each : As of ``examine``.
+    folders, each, completed : As of ``examine``.
     wait : How long to wait for another writer [s].
+    completed : What a fit adds to the rows that runs alone gave (``ident.fitting.fit.completed``); a commit may
+        be of either.
 
     Returns
     -------
@@ -199,7 +213,7 @@ def repair(
     local = Storage(path).local
     if local is None:
         raise InputError(path, "an object store", "a folder; copy the database and repair the copy")
-    before = examine(path, folders, each)
+    before = examine(path, folders, each, completed)
     if before.whole:
         return before
     done: list[str] = []
@@ -208,14 +222,14 @@ def repair(
         done += _log_mended(local, log)
         log = Log(path)
         faults = _faults(log, each)
-        sources = _sources(log, faults, folders) if any(faults.values()) else {}
+        sources = _sources(log, faults, folders, completed) if any(faults.values()) else {}
         for number, fault in faults.items():
             if fault:
                 done += _files_mended(local, log, number, sources)
         faults = _faults(Log(path), each)
         if faults[log.last]:
             done += _latest_again(path, log, faults[log.last], sources)
-    after = examine(path, folders, each)
+    after = examine(path, folders, each, completed)
     return Examination(after.database, after.versions, after.notes, done)
 
 

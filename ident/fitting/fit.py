@@ -120,6 +120,11 @@ def given_of(campaign: Campaign) -> Given:
     return Given(speed, yaw, tuple(shared))
 
 
+def completed(campaign: Campaign, rows: pd.DataFrame) -> pd.DataFrame:
+    """The predicted rows of a campaign, from those that its runs alone gave."""
+    return predicted(campaign.vehicle, rows, given_of(campaign))[0]
+
+
 def metadata(
     campaign: Campaign,
     found: Identification,

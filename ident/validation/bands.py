@@ -17,7 +17,6 @@ from ident.metrics.measure import Metrics, measured
 from ident.text import on_screen
 from ident.validation.cluster import over_dask
 from ident.validation.draws import draw, scores
-from ident.validation.products import product
 from sim.boat.coefficients import Coefficients
 from sim.boat.row_codec import correlation_matrix
 from sim.boat.vehicle import Vehicle
@@ -26,6 +25,7 @@ from sim.flight.case import Case, Series
 from sim.flight.simulate import DERIVED, columns_of, environment_of, equipped, fly, samples_of, uses_tanks, water_of
 from sim.flight.trim import NoEquilibrium
 from sim.kernel.assemble import Assembly
+from sim.kernel.products import product
 from sim.waves.in_waves import Water
 
 if TYPE_CHECKING:
