@@ -190,7 +190,9 @@ def _apparent(evidence: Evidence) -> Iterator[tuple[str, str, pd.DataFrame, floa
     for acceleration, output in _ANSWERS.items():
         alone = moving[acceleration] & (moving.sum(axis=1) == 1) & kept(runs, output)
         for file, group in runs[alone].groupby("file", sort=False):
-            whole = group.groupby([acceleration, group["D0"].fillna(0.0)]).agg({output: "sum"}).reset_index()
+            # Repeated runs of a part are one load of it; the parts make the whole.
+            parts = group.groupby([acceleration, group["D0"].fillna(0.0), "part"])[output].mean()
+            whole = parts.groupby(level=[0, 1]).sum().reset_index()
             whole = whole if group["part"].nunique() > 1 else group
             x, y = whole[acceleration].to_numpy(float), whole[output].to_numpy(float)
             if not x @ x > 0.0:
