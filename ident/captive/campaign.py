@@ -112,7 +112,9 @@ def _sources(folder: Path, header: CampaignFile, vehicle: Vehicle) -> list[Sourc
     # Tables that the vehicle file names are no runs.
     named = [Path(p) for p in (vehicle.terms, vehicle.errata, vehicle.geometry) if p]
     beside = {*header.tables.given().values(), *(p.name for p in named if p.parent.resolve() == folder.resolve())}
-    names = [sorted(p.name for p in folder.glob(kind) if p.name not in beside) for kind in ("*.csv", "*.parquet")]
+    every = sorted(p for p in folder.glob("[!.]*") if p.name not in beside)
+    # RUNS.CSV is a table as well: some systems write names in capitals.
+    names = [[p.name for p in every if p.suffix.lower() == kind] for kind in (".csv", ".parquet")]
     found = [Source(files=glob.escape(name)) for kind in names for name in kind]
     if not found:
         raise InputError(str(folder), "no CSV file of runs", "one CSV a test beside campaign.toml, or [[source]]")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import glob
 import os
 import re
 from pathlib import Path
@@ -58,16 +57,25 @@ def matching(folder: Path, source: Source) -> list[Path]:
     Raises
     ------
     InputError
-        When there is none.
+        When there is none, or a link leads out of the folder.
     """
     try:
-        names = glob.glob(source.files, root_dir=folder, recursive=True)
-    except (ValueError, re.error, OSError):
-        names = []
-    found = sorted(folder / name for name in names)
+        # Does not follow links to folders below **, which may lead round in circles.
+        found = sorted(p for p in folder.glob(source.files) if not _is_hidden(p, folder, source.files))
+    except (ValueError, IndexError, NotImplementedError, re.error, OSError):
+        found = []
+    top = folder.resolve()
+    for path in found:
+        if not path.resolve().is_relative_to(top):
+            raise InputError(str(path), f"a link to {path.resolve()}", "a file below the campaign's folder")
     if not found:
         raise InputError(f"{folder / 'campaign.toml'}, key source.files", f"no file {source.files!r}", "a path or glob")
     return found
+
+
+def _is_hidden(path: Path, folder: Path, pattern: str) -> bool:
+    """Whether a name begins with a dot that the pattern does not ask for."""
+    return "/." not in f"/{pattern}" and any(part.startswith(".") for part in path.relative_to(folder).parts)
 
 
 def reader_of(path: Path, source: Source) -> str:
@@ -77,6 +85,9 @@ def reader_of(path: Path, source: Source) -> str:
     their first bytes, Fluent, SU2 and Tecplot files in their first lines; ``Monitor`` in the header
     is STAR-CCM+; a header with ``;``, a tab or ``,`` is a table; the rest are columns.
     """
+    if path.exists() and not (path.is_file() or path.is_dir()):
+        # Opening it would wait for who writes to it.
+        raise InputError(str(path), "a pipe or a device", "a file")
     if source.reader:
         return source.reader
     if path.is_dir():

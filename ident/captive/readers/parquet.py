@@ -18,6 +18,8 @@ from sim.files.errors import InputError
 
 Array = NDArray[np.float64]
 _BATCH = 1 << 14
+# No name, word or remark of a run is longer [bytes].
+LONGEST_CELL = 10_000
 _PLAIN = Dialect()
 # The index that pandas writes when it has no name.
 _INDEX = "__index_level_0__"
@@ -44,6 +46,7 @@ def open_parquet(path: Path, source: Source) -> Sheet:
     try:
         with pq.ParquetFile(path) as opened:
             schema = opened.schema_arrow
+            _check_sizes(path, opened.metadata)
     except bad as error:
         raise refused(error) from error
     names = [str(n) for n in schema.names]
@@ -66,11 +69,38 @@ def open_parquet(path: Path, source: Source) -> Sheet:
 
     def cells() -> Iterator[tuple[int, list[str]]]:
         for row, batch in batches(names):
+            for name in names:
+                _check_lengths(path, row, name, batch.column(name))
             columns = [batch.column(name).to_pylist() for name in names]
             for i, found in enumerate(zip(*columns, strict=True)):
                 yield row + i, ["" if c is None else _written(c) for c in found]
 
     return Sheet(path, 0, header, values, cells, _PLAIN, spacers=(_INDEX,))
+
+
+def _check_sizes(path: Path, metadata: Any) -> None:
+    """Refuse columns whose cells are too long on the average, before any is read. Raises ``InputError``."""
+    for group in (metadata.row_group(i) for i in range(metadata.num_row_groups)):
+        for column in (group.column(i) for i in range(group.num_columns)):
+            # A page of a few cells has a dictionary and a head besides.
+            if column.total_uncompressed_size > LONGEST_CELL * (column.num_values + 100):
+                place, size = f"{path}, column {column.path_in_schema[:60]}", column.total_uncompressed_size
+                found = f"{size} bytes in {column.num_values} cells"
+                raise InputError(place, found, f"cells of {LONGEST_CELL} bytes at most")
+
+
+def _check_lengths(path: Path, row: int, name: str, array: Any) -> None:
+    """Refuse text too long for a cell: a file of kilobytes may hold it in every row. Raises ``InputError``."""
+    import pyarrow as pa
+    import pyarrow.compute as pc
+
+    text = array.dictionary if pa.types.is_dictionary(array.type) else array
+    if not (pa.types.is_string(text.type) or pa.types.is_large_string(text.type)):
+        return
+    longest = pc.max(pc.binary_length(text)).as_py() or 0
+    if longest > LONGEST_CELL:
+        place = f"{path}, row {row} or after, column {name[:60]}"
+        raise InputError(place, f"a cell of {longest} bytes", f"{LONGEST_CELL} bytes at most")
 
 
 def _written(cell: Any) -> str:

@@ -1,0 +1,94 @@
+"""Authority: memory and time of a reader are bounded by the size of what a file means, not by what it unfolds to.
+
+Parquet files that unfold a thousandfold, pipes that nobody writes to, links that lead round in circles
+or out of the campaign's folder.
+"""
+
+from __future__ import annotations
+
+import os
+import resource
+import shutil
+import subprocess
+import sys
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+from small_campaign import HEADER, RUNS, assert_refused, fitted, write
+
+from ident.captive.campaign import read_campaign
+from sim.files.errors import InputError
+
+posix = pytest.mark.skipif(os.name != "posix", reason="pipes and links of POSIX")
+
+
+def table(rows: int, text: pa.Array | pa.DictionaryArray) -> pa.Table:
+    numbers = {"U_mps": np.full(rows, 5.0), "X_N": np.full(rows, 5.0), "rel_sigma": np.full(rows, 0.05)}
+    words = {"run_id": "r", "test": "drift_horizontal", "part": "hull", "quality": "as_published"}
+    constant = {k: pa.array([v] * rows) for k, v in words.items()}
+    return pa.table({**constant, **{k: pa.array(v) for k, v in numbers.items()}, "source": text})
+
+
+def one_word(rows: int, word: str) -> pa.DictionaryArray:
+    return pa.DictionaryArray.from_arrays(pa.array(np.zeros(rows, dtype=np.int32)), pa.array([word]))
+
+
+@pytest.mark.parametrize(
+    "text", [one_word(20_000, "y" * (1 << 20)), pa.array(["y" * 400_000_000])], ids=["in every row", "one cell"]
+)
+def test_a_small_parquet_file_does_not_unfold(tmp_path, text):
+    folder = write(tmp_path / "campaign")
+    (folder / "drift.csv").unlink()
+    pq.write_table(table(len(text), text), folder / "runs.parquet", compression="zstd")
+    assert (folder / "runs.parquet").stat().st_size < 100_000
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    assert_refused(folder, "column source", "10000 bytes at most")
+    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 300_000
+
+
+@posix
+def test_a_pipe_among_the_runs_is_refused_at_once(tmp_path):
+    folder = write(tmp_path / "campaign")
+    os.mkfifo(folder / "b.csv")
+    script = (
+        "import sys\nfrom pathlib import Path\nfrom ident.captive.campaign import read_campaign\n"
+        "from sim.files.errors import InputError\n"
+        "try:\n    read_campaign(Path(sys.argv[1]))\nexcept InputError as error:\n    print(error)\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script, str(folder)], capture_output=True, text=True, timeout=120, check=True
+    )
+    assert "a pipe or a device" in done.stdout
+
+
+@posix
+def test_links_in_circles_are_gone_through_once(tmp_path):
+    folder = write(tmp_path / "campaign", header=HEADER + '[[source]]\nfiles = "**/*.csv"\n')
+    for name in "abcdefgh":
+        (folder / name).symlink_to(".")
+    assert len(read_campaign(folder).runs) == 3
+
+
+@posix
+def test_links_out_of_the_folder_of_a_campaign_are_refused(tmp_path):
+    outside = tmp_path / "outside.csv"
+    outside.write_text(RUNS)
+    folder = write(tmp_path / "campaign", header=HEADER + '[[source]]\nfiles = "*.csv"\n')
+    (folder / "more.csv").symlink_to(outside)
+    assert_refused(folder, "more.csv", "a link to")
+
+
+def test_tables_with_names_in_capitals_are_read(tmp_path):
+    folder = write(tmp_path / "campaign")
+    expected = fitted(folder)
+    shutil.move(folder / "drift.csv", folder / "DRIFT.CSV")
+    assert fitted(folder)["value"].tolist() == expected["value"].tolist()
+
+
+def test_a_glob_that_is_none_is_one_message(tmp_path):
+    for k, pattern in enumerate(("[", "***", "nothing/*.csv")):
+        folder = write(tmp_path / f"campaign{k}", header=HEADER + f'[[source]]\nfiles = "{pattern}"\n')
+        with pytest.raises(InputError):
+            read_campaign(folder)
