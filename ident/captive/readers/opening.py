@@ -57,17 +57,13 @@ def matching(folder: Path, source: Source) -> list[Path]:
     Raises
     ------
     InputError
-        When there is none, or a link leads out of the folder.
+        When there is none.
     """
     try:
         # Does not follow links to folders below **, which may lead round in circles.
         found = sorted(p for p in folder.glob(source.files) if not _is_hidden(p, folder, source.files))
     except (ValueError, IndexError, NotImplementedError, re.error, OSError):
         found = []
-    top = folder.resolve()
-    for path in found:
-        if not path.resolve().is_relative_to(top):
-            raise InputError(str(path), f"a link to {path.resolve()}", "a file below the campaign's folder")
     if not found:
         raise InputError(f"{folder / 'campaign.toml'}, key source.files", f"no file {source.files!r}", "a path or glob")
     return found
