@@ -142,6 +142,8 @@ def facility(
     head = HEADER.replace('name = "small"', f'name = "{name}"').replace('vehicle = "bb2"', 'vehicle = "suboff"')
     head = head.replace("length_m = 70.2", "length_m = 4.2609").replace("1025.0", str(density))
     head = head.replace('x = "aft"', 'x = "forward"').replace('z = "up"', 'z = "down"')
+    # This balance has all components.
+    head = head.replace('[absent]\n"drift_horizontal.N" = "a made balance of two components"\n', "")
     (folder / "campaign.toml").write_text(head, "utf-8")
     generator = np.random.default_rng(seed)
     pressure = 0.5 * density * 4.2609**2 * 4.0

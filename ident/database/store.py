@@ -238,10 +238,11 @@ def _written(path: str, rows: pd.DataFrame, said: dict[str, str], how: dict[str,
 
     with engine(path, "the version cannot be written", "room, and a path you may write to"):
         try:
+            # Never tried again on top of what another wrote meanwhile: what it replaces would be another's.
             write_deltalake(
                 address(path),
                 arrow(rows),
-                commit_properties=CommitProperties(custom_metadata=said),
+                commit_properties=CommitProperties(custom_metadata=said, max_commit_retries=0),
                 post_commithook_properties=PostCommitHookProperties(cleanup_expired_logs=False),
                 **how,
             )
@@ -273,7 +274,8 @@ def _kept_for_ever(log: Log) -> Log:
             "time": str(time.time_ns() // 1_000_000),
         }
         said["seal"] = seal(said)
-        table.alter.set_table_properties(FOR_EVER, commit_properties=CommitProperties(custom_metadata=said))
+        never_again = CommitProperties(custom_metadata=said, max_commit_retries=0)
+        table.alter.set_table_properties(FOR_EVER, commit_properties=never_again)
     return Log(log.path)
 
 
