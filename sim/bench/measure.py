@@ -53,16 +53,20 @@ def _step_apart(case: Case, coefficients: Coefficients, model: Model) -> tuple[n
     return states, controls
 
 
-def _voyage(model: Model, states: np.ndarray, controls: np.ndarray, h: float, water: Water | None) -> None:
+def _voyage(
+    model: Model, states: np.ndarray, controls: np.ndarray, h: float, water: Water | None
+) -> Callable[[], None]:
+    """A step from each state; the sums over the waves start afresh each time."""
     around = surroundings(water, model.added_mass) if water else ()
     work, rate, out = workspace(model, around), np.zeros(controls.shape[1]), np.zeros(12)
     scratch = (work.real, work.whole, work.stage)
-    steps(model.real, model.whole, states, controls, rate, h, around, *scratch, out)
+    return lambda: steps(model.real, model.whole, states, controls, rate, h, around, *scratch, out)
 
 
 def _voyages(model: Model, states: np.ndarray, controls: np.ndarray, h: float, _: int) -> None:
+    voyage = _voyage(model, states, controls, h, None)
     for _ in range(500):
-        _voyage(model, states, controls, h, None)
+        voyage()
 
 
 def ratios(tries: int = 300, say: Callable[[str], None] = lambda text: None) -> dict[str, Any]:
@@ -91,9 +95,9 @@ def ratios(tries: int = 300, say: Callable[[str], None] = lambda text: None) -> 
     waters = [water_around(coefficients, environment, waves) for waves in (one, many)]
     calls: dict[str, Callable[[], object]] = {
         "rhs": lambda: rates(*flat, states, controls, work.real, work.whole, dy),
-        "calm": partial(_voyage, model, states, controls, h, None),
-        "regular": partial(_voyage, model, states, controls, h, waters[0]),
-        "components": partial(_voyage, model, states, controls, h, waters[1]),
+        "calm": _voyage(model, states, controls, h, None),
+        "regular": _voyage(model, states, controls, h, waters[0]),
+        "components": _voyage(model, states, controls, h, waters[1]),
     }
     say("right-hand sides and steps")
     found = {k: v / len(states) for k, v in shortest(calls, tries).items()}
