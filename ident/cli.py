@@ -10,7 +10,7 @@ from typing import Any, NoReturn
 import click
 
 from ident import __version__
-from ident.commands import animate, campaigns, doctor, flights, maneuvers, start, trials, versions
+from ident.commands import animate, campaigns, doctor, exports, flights, maneuvers, start, trials, versions
 from ident.commands.process import Terminated, ends_when_asked, ready_streams, silence
 from ident.commands.shared import inputs_kept
 from ident.text import visible
@@ -88,7 +88,7 @@ def main() -> None:
     """
 
 
-for _module in (start, campaigns, maneuvers, trials, flights, animate, versions, doctor):
+for _module in (start, campaigns, maneuvers, trials, flights, animate, versions, exports, doctor):
     for _command in vars(_module).values():
         if isinstance(_command, click.Command):
             main.add_command(inputs_kept(_command))

@@ -111,6 +111,7 @@ _MAY_BE_ABSENT = (
     "capytaine is installed",
     "the optional extra 'panels' (capytaine) is not installed",
     "needs the extra dask",
+    "needs a C compiler",
 )
 
 

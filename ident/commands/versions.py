@@ -1,4 +1,4 @@
-"""Commands on the versions of a database: report, versions, diff, export, vacuum."""
+"""Commands on the versions of a database: report, versions, diff, vacuum."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from ident.commands.shared import DB, FOLDER, OUT, VERSION, WAIT, console_for, emit, json_to
+from ident.commands.shared import DB, OUT, VERSION, WAIT, console_for, emit, json_to
 from ident.text import on_screen, visible
 
 
@@ -91,27 +91,6 @@ def diff(first: int, second: int, db: str, json_path: str | None) -> None:
         counts = [str(n) for n in (one.added, one.removed, one.changed)]
         table.add_row(on_screen(one.coefficient), *counts, change, f"{one.largest_change_in_stderr:.2f}")
     console_for().print(table)
-
-
-@click.command()
-@FOLDER
-@click.option("--format", "kind", type=click.Choice(["parquet", "csv", "json"]), default="csv", show_default=True)
-@DB
-@VERSION
-@json_to("Write what was exported as JSON.")
-def export(folder: Path, kind: str, db: str, version: int | None, json_path: str | None) -> None:
-    """Write one version as a plain file into FOLDER.
-
-    \b
-    Example: ident export --version 0 --format csv exported/
-    """
-    from ident.database.compare import export as run
-
-    done = run(db, version, kind, folder)
-    if json_path != "-":
-        click.echo(visible(done["file"]))
-    if json_path:
-        emit(done, json_path)
 
 
 @click.command()

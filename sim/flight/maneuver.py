@@ -249,6 +249,44 @@ def run(
 
 
 @outer
+def hold_for(
+    m: np.ndarray,
+    w: np.ndarray,
+    g: np.ndarray,
+    q: np.ndarray,
+    f: np.ndarray,
+    y: np.ndarray,
+    c: np.ndarray,
+    left: float,
+    h: float,
+    around: Around,
+    s: np.ndarray,
+    k: np.ndarray,
+    stage: Stage,
+    rate: np.ndarray,
+    start: float,
+) -> bool:
+    """Part of a sample with the commands in ``f`` held.
+
+    Parameters
+    ----------
+    left : Time until the next sample, at which the actuators are where they can be [s].
+    h : Step, not longer [s].
+    rate : (controls,) scratch. Others as ``run``.
+
+    Returns
+    -------
+    Whether the state is finite.
+    """
+    prepare(around, y, start)
+    move_actuators(g, q, f, c, left, rate)
+    step(m, w, y, c, rate, h, near_of(around), s, k, stage, y)
+    for i in range(c.size):
+        c[i] += h * rate[i]
+    return _is_finite(y)
+
+
+@outer
 def hold(
     m: np.ndarray,
     w: np.ndarray,
@@ -276,14 +314,8 @@ def hold(
     -------
     Time at the end [s]; not a number when the state left the finite numbers.
     """
-    near = near_of(around)
     for sample in range(steps):
-        prepare(around, y, start + sample * dt)
-        move_actuators(g, q, f, c, dt, rate)
-        step(m, w, y, c, rate, dt, near, s, k, stage, y)
-        for i in range(c.size):
-            c[i] += dt * rate[i]
-        if not _is_finite(y):
+        if not hold_for(m, w, g, q, f, y, c, dt, dt, around, s, k, stage, rate, start + sample * dt):
             return np.nan
     return start + steps * dt
 

@@ -22,6 +22,8 @@ from sim.waves.in_waves import surroundings
 
 Array = NDArray[np.float64]
 
+# Times closer than this share of a sample are one.
+_CLOSE = 1e-9
 COMMANDS = ("dV", "dH", "n", *TANKS)
 
 
@@ -114,6 +116,8 @@ class Plant:
 
     def reset(self) -> None:
         """Back to the start: time zero, initial state and controls, the commands that hold them."""
+        # Start of the present control sample, and what is left of it.
+        self._sample, self._left = 0.0, self.dt
         self.time, self.state, self.controls = 0.0, self._start.copy(), self._moved.copy()
         planes = len(self.vehicle.planes)
         level = (self.trim.dV, self.trim.dH) if self.trim else (0.0, 0.0)
@@ -160,11 +164,9 @@ class Plant:
         """
         if steps < 1:
             raise InputError("plant, steps", f"{steps}", "one control sample or more")
-        for name, value in commands.items():
-            self._check(name, value)
-        for name, value in commands.items():
-            self.commands[name] = float(value)
-            self._give(name)
+        if self._left != self.dt:
+            return self.advance(steps * self.dt, **commands)
+        self._take(commands)
         work, model = self._work, self._model
         end = maneuver.hold(
             model.real,
@@ -185,8 +187,67 @@ class Plant:
         )
         if end != end:
             raise FloatingPointError(f"the state left the finite numbers after {self.time:.3f} s")
-        self.time = end
+        self.time = self._sample = end
         return self.state.copy()
+
+    def advance(self, seconds: float, **commands: float) -> Array:
+        """Give commands and move on by a time that need not be a control sample.
+
+        A sample in which a command changes is flown in parts; the actuators are, at its end, where they can be.
+
+        Parameters
+        ----------
+        seconds : [s].
+        commands : As for ``step``.
+
+        Returns
+        -------
+        (12,) a copy of the state after it.
+
+        Raises
+        ------
+        InputError, FloatingPointError
+            As ``step``, and for a time that is not positive and finite.
+        """
+        if not (math.isfinite(seconds) and seconds > 0.0):
+            raise InputError("plant, seconds", f"{seconds}", "a positive, finite number")
+        self._take(commands)
+        work, model = self._work, self._model
+        while seconds > _CLOSE * self.dt:
+            ends = seconds > self._left - _CLOSE * self.dt
+            part = self._left if ends else seconds
+            fine = maneuver.hold_for(
+                model.real,
+                model.whole,
+                self._orders[0],
+                self._orders[1],
+                self._progress.f,
+                self.state,
+                self.controls,
+                self._left,
+                part,
+                work.around,
+                work.real,
+                work.whole,
+                work.stage,
+                self._rate,
+                self.time,
+            )
+            if not fine:
+                raise FloatingPointError(f"the state left the finite numbers after {self.time:.3f} s")
+            seconds -= part
+            if ends:
+                self._sample += self.dt
+            self._left = self.dt if ends else self._left - part
+            self.time = self._sample if ends else self._sample + (self.dt - self._left)
+        return self.state.copy()
+
+    def _take(self, commands: dict[str, float]) -> None:
+        for name, value in commands.items():
+            self._check(name, value)
+        for name, value in commands.items():
+            self.commands[name] = float(value)
+            self._give(name)
 
     def _check(self, name: str, value: float) -> None:
         if name not in self.commands:

@@ -223,6 +223,19 @@ def settings_of(case: Case, vehicle: Vehicle, state: Array, controls: Array, tri
     )
 
 
+def begun(case: Case, vehicle: Vehicle, model: Model) -> tuple[Model, Array, Array, Trim | None, orders.Settings]:
+    """A case ready to fly: the model as it is trimmed, state, controls, equilibrium and settings.
+
+    Raises
+    ------
+    As ``initial_state``.
+    """
+    state, controls, trim = initial_state(case, vehicle, model)
+    if trim and trim.lateral:
+        model = weight_across(model, trim.lateral)
+    return model, state, controls, trim, settings_of(case, vehicle, state, controls, trim)
+
+
 def simulate(case: Case, coefficients: Coefficients) -> Simulation:
     """Fly a case with the coefficients of its vehicle; raises as ``model_of``, ``water_of`` and ``fly``."""
     return fly(case, coefficients.vehicle, model_of(case, coefficients), water_of(case, coefficients))
@@ -247,10 +260,7 @@ def fly(case: Case, vehicle: Vehicle, model: Model, water: Water | None) -> Simu
     sim.flight.trim.NoEquilibrium
         When the case starts from self-propulsion and there is none.
     """
-    state, controls, trim = initial_state(case, vehicle, model)
-    if trim and trim.lateral:
-        model = weight_across(model, trim.lateral)
-    settings = settings_of(case, vehicle, state, controls, trim)
+    model, state, controls, trim, settings = begun(case, vehicle, model)
     dt, (steps, every) = case.run.step_s, samples_of(case)
     around = surroundings(water, model.added_mass) if water else ()
     flown = maneuver.fly_logged(model, settings, state, controls, dt, steps, every, around)

@@ -1,0 +1,95 @@
+"""Commands that take a version out of the program: export."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from ident.commands.shared import DB, VERSION, console_for, emit, equilibrium_of, json_to
+from ident.text import on_screen, visible
+
+# Formats that write the coefficients, and those that write a boat in a case.
+_ROWS = ("csv", "parquet", "json")
+_FLOWN = ("c", "fmu")
+_CASE = "hzz20"
+
+
+@click.command()
+@click.argument("path", type=click.Path(path_type=Path))
+@click.option("--format", "kind", type=click.Choice([*_ROWS, *_FLOWN]), default="csv", show_default=True)
+@click.option("--case", "case", default=None, help=f"With --format {', '.join(_FLOWN)}: start, water, step; {_CASE}.")
+@click.option("--vehicle", default=None, help="With --case: bundled vehicle or vehicle file, instead of the case's.")
+@click.option(
+    "--fmi", type=click.Choice(["2", "3"]), default=None, help="With --format fmu: version of FMI, 2 without."
+)
+@DB
+@VERSION
+@json_to("Write what was exported as JSON.")
+def export(
+    path: Path,
+    kind: str,
+    case: str | None,
+    vehicle: str | None,
+    fmi: str | None,
+    db: str,
+    version: int | None,
+    json_path: str | None,
+) -> None:
+    """Write one version for other programs.
+
+    PATH is a folder. csv, parquet, json: the coefficients as a plain file. c: the boat in a case as one header and
+    one source of C99, which step as the simulator does. fmu: the same as an FMU for co-simulation, with its sources,
+    compiled by the C compiler of this machine; PATH is FILE.fmu.
+
+    \b
+    Example: ident export --version 0 --format csv exported/
+             ident export --format c --case ss5-4m exported/
+             ident export --format fmu --case hzz20 hzz20.fmu
+    """
+    if kind in _ROWS and (case or vehicle):
+        raise click.UsageError(f"--case and --vehicle go with --format {', '.join(_FLOWN)}")
+    if fmi and kind != "fmu":
+        raise click.UsageError("--fmi goes with --format fmu")
+    console = console_for(quiet=json_path == "-")
+    with console.status("writing"):
+        if kind in _ROWS:
+            done = _rows(path, kind, db, version)
+        else:
+            done = _flown(path, kind, case or _CASE, vehicle, db, version, int(fmi or "2"))
+    if json_path != "-":
+        for name in done.get("files", [done.get("file")]):
+            click.echo(visible(name))
+    if json_path:
+        emit(done, json_path)
+
+
+def _rows(path: Path, kind: str, db: str, version: int | None) -> dict[str, Any]:
+    from ident.database.compare import export as run
+    from ident.output import check_folder
+
+    check_folder(path)
+    return run(db, version, kind, path)
+
+
+def _flown(
+    path: Path, kind: str, name: str, vehicle_name: str | None, db: str, version: int | None, fmi: int
+) -> dict[str, Any]:
+    from ident.output import check_file, check_folder
+    from ident.validation.boats import Fleet
+    from sim.boat.vehicle import load_vehicle
+    from sim.flight.case import load_case
+
+    (check_folder if kind == "c" else check_file)(path)
+    case, where = load_case(name)
+    vehicle = load_vehicle(vehicle_name) if vehicle_name else load_vehicle(case.vehicle, beside=where)
+    boat = Fleet(db, version).boat(vehicle)
+    with equilibrium_of(on_screen(name)):
+        if kind == "c":
+            from ident.exports.c_source import export_c
+
+            return export_c(boat, case, db, path)
+        from ident.exports.fmu import export_fmu
+
+        return export_fmu(boat, case, db, path, fmi)
