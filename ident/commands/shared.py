@@ -47,6 +47,22 @@ def _file(context: click.Context, parameter: click.Parameter, value: Any) -> Any
     return value
 
 
+# What a figure may be written as.
+DRAWINGS = (".png", ".svg", ".pdf")
+
+
+def _drawing(context: click.Context, parameter: click.Parameter, value: Path | None) -> Path | None:
+    if value is not None and value.suffix.lower() not in DRAWINGS:
+        raise click.BadParameter(f"{value.name!r} (allowed: a name that ends in {', '.join(DRAWINGS)})")
+    _file(context, parameter, value)
+    return value
+
+
+def figure_to(text: str) -> Any:
+    """The option ``--figure`` of a command, with its help."""
+    return click.option("--figure", type=click.Path(path_type=Path), default=None, callback=_drawing, help=text)
+
+
 def _inputs(command: click.Command, values: dict[str, Any]) -> list[Path]:
     """Files and folders among the arguments that a command reads, its database among them."""
     read = [str(values[p.name]) for p in command.params if p.name and values.get(p.name) and not _is_written(p)]
@@ -54,7 +70,7 @@ def _inputs(command: click.Command, values: dict[str, Any]) -> list[Path]:
 
 
 def _is_written(parameter: click.Parameter) -> bool:
-    return parameter.callback in (_file, _folder)
+    return parameter.callback in (_file, _folder, _drawing)
 
 
 def _refuse_inputs(command: click.Command, values: dict[str, Any]) -> None:
@@ -79,7 +95,7 @@ def _refuse_inputs(command: click.Command, values: dict[str, Any]) -> None:
 
 
 # What the program writes and no campaign consists of: may be written again in a campaign's folder.
-_RESULTS = (".json", ".png", ".html", ".gif", ".mp4")
+_RESULTS = (".json", ".png", ".svg", ".pdf", ".html", ".gif", ".mp4")
 
 
 def inputs_kept(command: click.Command) -> click.Command:

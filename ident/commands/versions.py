@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from ident.commands.shared import DB, OUT, VERSION, WAIT, console_for, emit, json_to
+from ident.commands.shared import DB, OUT, VERSION, WAIT, console_for, emit, figure_to, json_to
 from ident.text import on_screen, visible
 
 
@@ -17,22 +17,41 @@ from ident.text import on_screen, visible
     "--vehicle", default=None, help="Bundled vehicle or path to a vehicle file; all of the version's without it."
 )
 @OUT
+@click.option("--interactive", is_flag=True, help="Also a page with figures to turn and slice (extra: report).")
+@click.option(
+    "--beside", type=int, multiple=True, metavar="N", help="Another version in the interactive figures; repeatable."
+)
 @json_to("Write what the page shows as JSON.")
-def report(db: str, version: int | None, vehicle: str | None, out: Path, json_path: str | None) -> None:
+def report(
+    db: str,
+    version: int | None,
+    vehicle: str | None,
+    out: Path,
+    interactive: bool,
+    beside: tuple[int, ...],
+    json_path: str | None,
+) -> None:
     """Write one self-contained HTML page on each vehicle of a database version.
 
     With --json, one object for one vehicle, a list for several.
 
     \b
     Example: ident report --version 0
+             ident report --version 2 --interactive --beside 0
     """
+    from ident.report.interactive import plotly
     from ident.report.page import reported_vehicles, write_report
+
+    if beside and not interactive:
+        raise click.UsageError("--beside changes nothing without --interactive")
+    if interactive:
+        plotly()
 
     console = console_for(quiet=json_path == "-")
     done = []
     for name in [vehicle] if vehicle else reported_vehicles(db, version):
         with console.status(f"drawing every coefficient of {on_screen(name)}"):
-            done.append(write_report(db, version, out, name))
+            done.append(write_report(db, version, out, name, interactive, beside))
         console.print(f"report: {on_screen(done[-1]['file'])}", highlight=False)
     if json_path:
         emit(done[0] if len(done) == 1 else done, json_path)
@@ -65,19 +84,24 @@ def versions(db: str, json_path: str | None) -> None:
 @click.argument("first", type=int)
 @click.argument("second", type=int)
 @DB
+@figure_to("Draw the changes: PNG, SVG or PDF.")
 @json_to("Write the differences as JSON.")
-def diff(first: int, second: int, db: str, json_path: str | None) -> None:
+def diff(first: int, second: int, db: str, figure: Path | None, json_path: str | None) -> None:
     """Show what changed between two versions.
 
     \b
     Example: ident diff 0 1
+             ident diff 0 1 --figure changes.svg
     """
     from rich.table import Table
 
     import ident
+    from ident.report.difference import draw_difference
 
     versions = ident.Database(db)
     found = versions[first].diff(versions[second])
+    if figure is not None:
+        draw_difference(found, figure, Path(db).name)
     if json_path:
         emit(found.to_dict(), json_path)
     if json_path == "-":
@@ -85,11 +109,13 @@ def diff(first: int, second: int, db: str, json_path: str | None) -> None:
     if not found:
         click.echo(f"versions {first} and {second} hold the same coefficients")
         return
-    table = Table("coefficient", "added", "removed", "changed", "largest change", "in standard errors")
+    table = Table("vehicle", "coefficient", "added", "removed", "changed", "largest change", "in standard errors")
     for one in found:
         change = f"{100 * one.largest_relative_change:.3g} %"
         counts = [str(n) for n in (one.added, one.removed, one.changed)]
-        table.add_row(on_screen(one.coefficient), *counts, change, f"{one.largest_change_in_stderr:.2f}")
+        table.add_row(
+            on_screen(one.vehicle), on_screen(one.coefficient), *counts, change, f"{one.largest_change_in_stderr:.2f}"
+        )
     console_for().print(table)
 
 

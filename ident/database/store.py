@@ -25,6 +25,7 @@ from sim.boat.database import (
     column_order,
     column_type,
     digest,
+    last_own,
     open_table,
     to_column,
     whole_version,
@@ -179,7 +180,8 @@ def _commit(path: str, rows: pd.DataFrame, metadata: dict[str, str], wait: float
             if beside.pop(vehicle, "") == content:
                 return log.last, False
             log = _kept_for_ever(log)
-        parent = metadata.get("parent", str(log.last) if log else "")
+        before = last_own(log.versions, vehicle, log.last) if log else None
+        parent = metadata.get("parent", str(before.number) if before else "")
         said = _said({**metadata, "parent": parent}, vehicle, content, beside, log.last if log else -1)
         how: dict[str, Any] = {"mode": "error", "configuration": FOR_EVER}
         if log:

@@ -205,9 +205,18 @@ class DatabaseVersion:
     def to_dict(self) -> dict[str, Any]:
         """Number, time, vehicle, campaign, digest, parent, program and message, as ``ident versions`` lists them."""
         said = {k: self.metadata.get(k, "") for k in _SAID}
+        said["parent"] = self._parent()
         if self.commit.operation:
             said["message"] = f"{self.commit.operation} by another program"
         return {"version": self.number, "time": self.time, **said}
+
+    def _parent(self) -> str:
+        """The parent that is named, unless it holds no rows of the vehicle: early releases named any."""
+        named = self.metadata.get("parent", "")
+        vehicle = self.metadata.get("vehicle", "")
+        if vehicle and named.isdigit() and last_own(list(self.history), vehicle, int(named)) is None:
+            return ""
+        return named
 
     def _repr_html_(self) -> str:
         title = f"version {self.number} of {self.path}: {len(self.rows)} values of {', '.join(self.vehicles)}"

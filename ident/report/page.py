@@ -5,7 +5,9 @@ from __future__ import annotations
 import csv
 import json
 import re
+from collections.abc import Sequence
 from datetime import UTC, datetime
+from functools import partial
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -18,6 +20,9 @@ from ident.database.provenance import steps
 from ident.fitting.notes import group_unused, group_warnings
 from ident.output import whole
 from ident.report.figures import draw_figures, equations, quality_colours
+from ident.report.interactive import Drawn, write_interactive
+from ident.report.values import Run, runs_of, term_anchor, term_pages
+from ident.report.values import number as _figure
 from sim.boat import catalogue
 from sim.boat.catalogue import RULES, Term
 from sim.boat.coefficients import Coefficients
@@ -30,6 +35,8 @@ from sim.files.frames import PROGRAM
 
 # Prime derivatives do not depend on density and gravity, so both may be anything.
 _UNIT = Environment(density=1.0, gravity=0.0)
+# Runs of one value that are printed one by one.
+_MANY_RUNS = 40
 
 
 def _stored(metadata: dict[str, str], key: str, default: Any) -> Any:
@@ -45,9 +52,16 @@ def _time(stamp: str) -> str:
     return datetime.fromtimestamp(int(stamp) / 1000, UTC).strftime("%Y-%m-%d %H:%M UTC") if stamp.isdigit() else stamp
 
 
+def _option(key: str, value: Any) -> str:
+    """An option of the fit in words."""
+    if isinstance(value, dict):
+        return f"{key}: " + ", ".join(f"{k} {v}" for k, v in value.items())
+    return f"{key} {value}"
+
+
 def _provenance(db: str, number: int, commit: Version, vehicle: Vehicle) -> list[tuple[str, str]]:
     known = commit.metadata
-    options = _stored(known, "options", {})
+    options = [_option(key, value) for key, value in _stored(known, "options", {}).items()]
     return [
         ("Database", db),
         ("Version", str(number)),
@@ -64,12 +78,8 @@ def _provenance(db: str, number: int, commit: Version, vehicle: Vehicle) -> list
         ("Frame of the campaign", known.get("frame", "")),
         ("Frame of the database", f"{PROGRAM} (SNAME)"),
         ("Provenance", " ".join(known.get("provenance", "").split())),
-        ("Options of the fit", ", ".join(f"{k} = {v}" for k, v in options.items()) or "none"),
+        ("Options of the fit", "; ".join(options) or "none"),
     ]
-
-
-def _figure(x: float) -> str:
-    return f"{x:.5g}".replace("-", "\N{MINUS SIGN}")
 
 
 def _ranges(term: Term, rows: pd.DataFrame) -> list[str]:
@@ -208,12 +218,22 @@ def _errata(vehicle: Vehicle) -> list[dict[str, str]]:
 
 def _content(db: str, number: int, vehicle: Vehicle, rows: pd.DataFrame, commit: Version) -> dict[str, Any]:
     """Everything the template shows."""
+    from markupsafe import Markup
+
     vocabulary = _vocabulary(commit.metadata, rows)
     colours = quality_colours(q["word"] for q in vocabulary)
     coverage = _coverage(vehicle, rows, {q["word"]: q["factor"] or 1.0 for q in vocabulary})
     columns = {a: c for c, a in axis_columns().items()}
     combined = (rows[columns["alpha"]].fillna(0.0) != 0.0) & (rows[columns["beta"]].fillna(0.0) != 0.0)
+    pictures = draw_figures(vehicle, rows, colours, number)
+    runs = runs_of(rows, commit)
+    pages = term_pages(vehicle_terms(vehicle), rows, pictures, runs)
     return {
+        "term_pages": pages,
+        "drawn": {p.symbol: [anchor for anchor, _ in p.figures] for p in pages},
+        "runs": list(runs.values()),
+        "many_runs": _MANY_RUNS,
+        "script": Markup((files("ident") / "report" / "report.js").read_text("utf-8")),
         "vehicle": vehicle,
         "version": number,
         "frame": str(PROGRAM),
@@ -226,11 +246,12 @@ def _content(db: str, number: int, vehicle: Vehicle, rows: pd.DataFrame, commit:
         "combined": int(combined.sum()),
         "rules": RULES,
         "points": len(rows),
-        "pictures": draw_figures(vehicle, rows, colours, number),
+        "pictures": pictures,
         "signs": _signs(Coefficients(vehicle, rows), rows),
         "warnings": group_warnings(_stored(commit.metadata, "warnings", [])),
         "unused": group_unused(_stored(commit.metadata, "unused", [])),
         "checks": _stored(commit.metadata, "checks", []) if "checks" in commit.metadata else None,
+        "severities": _severities(_stored(commit.metadata, "checks", []) if "checks" in commit.metadata else None),
         "calibration": _calibration(commit, vehicle, number),
         "vocabulary": vocabulary,
         "colours": colours,
@@ -260,7 +281,14 @@ def reported_vehicles(db: str, version: int | None) -> list[str]:
     return known
 
 
-def write_report(db: str, version: int | None, out: Path, vehicle: str) -> dict[str, Any]:
+def _drawn(db: str, number: int, vehicle: str) -> tuple[pd.DataFrame, dict[str, Run]]:
+    rows, _ = read_rows(db, number, vehicle)
+    return rows, runs_of(rows, own_version(db, vehicle, number))
+
+
+def write_report(
+    db: str, version: int | None, out: Path, vehicle: str, interactive: bool = False, beside: Sequence[int] = ()
+) -> dict[str, Any]:
     """Write the report of one vehicle at one database version.
 
     Parameters
@@ -269,6 +297,8 @@ def write_report(db: str, version: int | None, out: Path, vehicle: str) -> dict[
     version : Version number, latest when None.
     out : Folder for the page; created when absent.
     vehicle : Bundled name or path to a vehicle file.
+    interactive : Write a page with figures to turn and slice beside it, ``<vehicle>_v<version>_interactive.html``.
+    beside : Other versions drawn in the interactive figures.
 
     Returns
     -------
@@ -281,21 +311,28 @@ def write_report(db: str, version: int | None, out: Path, vehicle: str) -> dict[
         When database, version or vehicle do not exist, or the page cannot be written.
     """
     from jinja2 import Environment as Templates
-    from jinja2 import StrictUndefined
+    from jinja2 import PackageLoader, StrictUndefined
 
     boat = load_vehicle(vehicle)
     rows, number = read_rows(db, version, boat.name)
-    templates = Templates(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
-    templates.filters["spans"] = spans
-    source = (files("ident") / "report" / "report.html.j2").read_text("utf-8")
+    loader = PackageLoader("ident", "report")
+    templates = Templates(
+        loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+    )
+    templates.filters |= {"spans": spans, "term_anchor": term_anchor, "plain": partial(_figure, digits=4)}
     commit = own_version(db, boat.name, number)
-    content = _content(db, number, boat, rows, commit)
-    page = templates.from_string(source).render(content)
     path = Path(out) / f"{re.sub(r'[^A-Za-z0-9._-]', '_', boat.name)}_v{number}.html"
+    page_of_figures = path.with_name(f"{path.stem}_interactive.html")
+    if interactive:
+        shown = [Drawn(n, *_drawn(db, n, boat.name)) for n in dict.fromkeys((number, *beside))]
+        write_interactive(boat, shown, page_of_figures, path.name)
+    content = _content(db, number, boat, rows, commit) | {"interactive": page_of_figures.name if interactive else ""}
+    page = templates.get_template("report.html.j2").render(content)
     with whole(path) as part:
         part.write_text(page, encoding="utf-8")
     return {
         "file": str(path),
+        "interactive": str(page_of_figures) if interactive else None,
         "vehicle": boat.name,
         "database": {"path": db, "version": number, "digest": commit.digest},
         "rows": len(rows),
