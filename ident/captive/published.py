@@ -28,7 +28,7 @@ def turn_sign(term: Term, frame: Frame) -> int:
     The product of the signs of its load and of its multiplier; magnitudes, S and plane
     deflections (about the plane's own axis) do not turn.
     """
-    sign = int(frame.sign(term.output))
+    sign = int(frame.sign(term.output)) if term.output else 1
     for factor in term.factors:
         bare = factor[4:-1] if factor.startswith("sgn(") else factor
         bare = bare.removesuffix("/U")
@@ -43,7 +43,7 @@ def _term(run: pd.Series, terms: dict[str, Term], place: str) -> Term:
         known = ", ".join(t.name for t in terms.values() if not t.axes)
         raise InputError(f"{place}, column coefficient", repr(name), f"a term of the vehicle's set: {known}")
     term = terms[name]
-    if term.axes or not term.output:
+    if term.axes or (not term.output and TEST not in term.tests):
         text = "a constant coefficient; tabulated ones are given as runs"
         raise InputError(f"{place}, column coefficient", f"{name}, tabulated over {' '.join(term.axes)}", text)
     if run["part"] != term.part and term.part != "section":
@@ -63,7 +63,7 @@ def factor_of(run: pd.Series, term: Term, header: CampaignFile, vehicle: Vehicle
     InputError
         For a unit that is not one of these, or a speed that is needed and not given.
     """
-    unit = str(run.get("value_unit") or "")
+    unit = str(run["unit"] or run.get("value_unit") or "")
     name = str(run.get("normalisation") or "")
     powers, angles = _unit(unit, f"{place}, column value")
     length = header.scale.ratio * header.scale.length_m
@@ -71,6 +71,14 @@ def factor_of(run: pd.Series, term: Term, header: CampaignFile, vehicle: Vehicle
     sign = float(turn_sign(term, header.frame.frame))
     if angles[1]:
         sign = _sign_of_angles(term, header, angles[1], f"{place}, column value")
+    if term.norm == "SI":
+        if name or header.scale.ratio != 1.0:
+            text = "no normalisation and the vehicle's own scale: the coefficient has a dimension"
+            raise InputError(f"{place}, column value", f"{name} at scale {header.scale.ratio:g}", text)
+        if not any(powers):
+            text = f"the unit of {term.output} over {term.multiplier}, such as kg/s or N s/m"
+            raise InputError(f"{place}, column value", f"no unit for {term.name}", text)
+        return sign * angles[0] * _from_dimension(run, term, powers, unit, header, place)
     if term.norm != "rho/2 L":
         if unit or name:
             text = f"nothing: {term.name} is the same in every normalisation and has no unit"
@@ -160,7 +168,7 @@ def _from_dimension(
         name = _bare(factor)
         if name in ("u", "v", "w", "U", "V", "S"):
             metres, seconds = metres - 1.0, seconds + 1.0
-        elif name in ("p", "q", "r"):
+        elif name in ("p", "q", "r", "n"):
             seconds += 1.0
         elif name in ACCELERATIONS:
             metres, seconds = metres - (1.0 if name in ACCELERATIONS[:3] else 0.0), seconds + 2.0
@@ -172,7 +180,11 @@ def _from_dimension(
             f"the dimension of {term.output} over {term.multiplier}, perhaps without its speeds; or none for prime form"
         )
         raise InputError(f"{place}, column value", f"unit {unit!r} for {term.name}", text)
-    scale = 0.5 * header.fluid.density_kgpm3 * header.scale.length_m**term.power
+    scale = 1.0 if term.norm == "SI" else 0.5 * header.fluid.density_kgpm3 * header.scale.length_m**term.power
+    if speeds != 0.0 and term.norm == "SI":
+        raise InputError(
+            f"{place}, column value", f"unit {unit!r}", f"the unit of {term.output} over {term.multiplier}"
+        )
     if speeds == 0.0:
         return 1.0 / scale
     speed = float(run["U"]) if pd.notna(run.get("U")) else math.nan
@@ -207,13 +219,17 @@ def to_program(
         with x aft.
     """
     frame = header.frame.frame
-    chosen = (runs["coefficient"] != "") | (runs["test"] == TEST) | runs["value"].notna()
+    chosen = (runs["coefficient"] != "") | (runs["test"] == TEST) | runs["value"].notna() | (runs["unit"] != "")
     terms = {t.name: t for t in vehicle_terms(vehicle)}
     out = runs.copy()
     for i, run in runs[chosen].iterrows():
         place = f"{folder}/{run['file']}, row {run['row']}"
+        if run["unit"] and str(run.get("value_unit") or ""):
+            raise InputError(
+                f"{place}, column unit", repr(run["unit"]), "a unit in the header or in the row, not in both"
+            )
         if run["test"] != TEST:
-            raise InputError(f"{place}, column coefficient or value", "not blank", f"blank but for {TEST} rows")
+            raise InputError(f"{place}, column coefficient, value or unit", "not blank", f"blank but for {TEST} rows")
         given = [o for o in (*OUTPUTS, "KT", "KQ", "t") if pd.notna(run[o])]
         if given:
             raise InputError(f"{place}, column {given[0]}", str(run[given[0]]), f"nothing but value in a {TEST} row")

@@ -167,6 +167,8 @@ def _clean(unit: str) -> str | None:
     text = text.replace("°", "deg").replace("º", "deg").translate(_RAISED)
     text = re.sub(r"[·⋅.]", "*", text.replace("^", "**"))
     text = re.sub(r"(?<![*/])\s+(?![*/])", "*", text.strip())
+    # A product in brackets divides as a whole: kg/(m rad) is kg/m/rad.
+    text = re.sub(r"/\s*\(([^()]*)\)", lambda m: "/" + re.sub(r"(?<!\*)\*(?!\*)", "/", m[1].strip()), text)
     parts = [p.strip() for p in re.split(r"(?<!\*)\*(?!\*)|(/)", text) if p is not None]
     found = []
     for part in parts:

@@ -23,7 +23,19 @@ MEASURED = (*OUTPUTS, *DIRECT)
 # Numbers that a table has, blank where no file gives them.
 NUMBERS = (*STATES[:7], "rel_sigma", *MOTION, *MEASURED)
 # Texts that a file may give, and those it must.
-TEXT = ("run_id", "test", "part", "quality", "source", "copy_of", "exclude", "reason", "decoupled", "coefficient")
+TEXT = (
+    "run_id",
+    "test",
+    "part",
+    "quality",
+    "source",
+    "copy_of",
+    "exclude",
+    "reason",
+    "decoupled",
+    "coefficient",
+    "unit",
+)
 REQUIRED = TEXT[:5]
 # Texts that quality checks read.
 _CHECKED = ("run_id", "test", "part", "quality", "copy_of", "exclude", "file")

@@ -69,7 +69,7 @@ def published_sizes(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
         return
     ranges = {s["coefficient"]: (float(s["low"]), float(s["high"])) for s in _sizes() if s["coefficient"]}
     norms = {t.name: t.norm for t in vehicle_terms(evidence.vehicle)}
-    given = runs[runs["coefficient"].isin(list(norms)) & runs["value"].notna() & (runs["value"] != 0.0)]
+    given = runs[runs["coefficient"].isin(list(norms)) & kept(runs, "value") & (runs["value"] != 0.0)]
     for _, run in given[given["coefficient"].map(norms) == "rho/2 L"].iterrows():
         name, value = str(run["coefficient"]), abs(float(run["value"]))
         low, high = ranges.get(name, (0.0, rule.limits["published"]))

@@ -183,11 +183,11 @@ class Solver:
             return Form(output, {}, {}), [Note(output, f"{output} is not taken from a {run['test']} run", unused=True)]
         part = run["part"] if published else term.part
         key, sign = self.canonical(term.name, part, self.place(term, features))
-        if published and sign == 0:
-            return Form(output, {}, {}), [Note(output, f"{term.name} is zero by port/starboard symmetry", unused=True)]
-        if not published:
+        if not published or part == "propeller":
             # A propeller turns one way: the mirror does not hold for it.
             sign = 1
+        if sign == 0:
+            return Form(output, {}, {}), [Note(output, f"{term.name} is zero by port/starboard symmetry", unused=True)]
         node = self.node(key)
         self.nodes[node].seen.add((part, key[2]))
         return Form(output, {node: float(sign)}, {}), []

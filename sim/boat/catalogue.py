@@ -21,7 +21,7 @@ from sim.files.errors import InputError
 OUTPUTS = ("X", "Y", "Z", "K", "M", "N")
 # The state in its order: velocities in the body frame, position and angles in the earth frame.
 STATES = ("u", "v", "w", "p", "q", "r", "x", "y", "z", "phi", "theta", "psi")
-SETS = ("reduced", "gertler_hagen", "mmg")
+SETS = ("reduced", "gertler_hagen", "mmg", "auv", "nps_auv")
 # Extrapolation rules of an axis; ``sim.boat.tables`` implements them.
 RULES = {
     "hold": "the value at the last point",
@@ -43,7 +43,7 @@ BOAT_FEATURES = (
     *("u", "v", "w", "p", "q", "r", "|u|", "|v|", "|w|", "|p|", "|q|", "|r|"),
     *("U", "S", "sgn(v)", "sgn(w)", "alpha", "beta", "D0", "n", "|n|", "J"),
     *("up", "uq", "ur", "vp", "vq", "vr", "wp", "wq", "wr", "pq", "qr", "rp"),
-    *("v/U", "r/U", "v/r", "w/q"),
+    *("v/U", "r/U", "v/r", "w/q", "slip", "uslip"),
 )
 # Rates below this [rad/s] have no pivot v/r or w/q: what depends on it has vanished with the rate.
 STILL = 1e-9
@@ -74,11 +74,12 @@ class Term:
     Attributes
     ----------
     name : Symbol in Gertler-Hagen/Feldman style, unique within a set.
-    sets : Term sets the row belongs to (``reduced``, ``gertler_hagen``, ``mmg``).
+    sets : Term sets the row belongs to, of ``SETS``.
     group : Physical group, for reports.
-    output : Load component ``X Y Z`` [N] or ``K M N`` [N m]; empty for ``t`` and ``w_T``.
+    output : Load component ``X Y Z`` [N] or ``K M N`` [N m]; empty for what is no load of its own, as ``t``.
     power : Power of the reference length.
-    norm : ``rho/2 L`` (1/2 rho L^n), ``rho D`` (rho D^n) or empty (the value itself).
+    norm : ``rho/2 L`` (1/2 rho L^n), ``rho D`` (rho D^n), ``SI`` (the load over the monomial, with its
+        dimension) or empty (the value itself).
     factors : Factors of the monomial m(state).
     sign : +1 or -1 in front of the monomial.
     part : Part of the boat that carries the load.
@@ -211,8 +212,10 @@ def terms(term_set: str = "reduced") -> tuple[Term, ...]:
     Parameters
     ----------
     term_set : ``reduced`` (Eqs. 26-31, tables) or ``gertler_hagen`` (Eqs. 17-22,
-        constant coefficients: all axes but J and those of t are dropped) or ``mmg`` (ships
-        in surge, sway and yaw: constant coefficients of Yasukawa and Yoshimura 2015).
+        constant coefficients: all axes but J and those of t are dropped), ``mmg`` (ships
+        in surge, sway and yaw: constant coefficients of Yasukawa and Yoshimura 2015), ``auv``
+        (slender vehicles as Prestero 2001 and da Silva et al. 2007 write them) or ``nps_auv``
+        (Healey and Lienard 1993).
 
     Raises
     ------
@@ -229,7 +232,7 @@ def terms(term_set: str = "reduced") -> tuple[Term, ...]:
         raise CatalogueError(f"term table: a name stands twice in the set {term_set!r}")
     for term in chosen:
         check(term)
-    if term_set == "gertler_hagen":
+    if term_set in ("gertler_hagen", "auv", "nps_auv"):
         chosen = [t if t.group == "propulsion" else replace(t, axes=(), parity={}, extrapolation={}) for t in chosen]
     return tuple(chosen)
 
@@ -303,6 +306,19 @@ def term(name: str, term_set: str = "reduced") -> Term:
         if row.name == name:
             return row
     raise CatalogueError(f"the set {term_set!r} has no term {name!r}")
+
+
+@cache
+def held(term_set: str) -> tuple[str, ...]:
+    """Loads that no row of a set has: the motions they would drive are held.
+
+    Examples
+    --------
+    >>> held("mmg")
+    ('Z', 'K', 'M')
+    """
+    there = {t.output for t in terms(term_set)}
+    return tuple(o for o in OUTPUTS if o not in there)
 
 
 def feature_index(factor: str, plane: int = -1) -> int:

@@ -42,6 +42,7 @@ def boat_features(
     depth: float,
     revolutions: float = math.nan,
     advance: float = math.nan,
+    slip: float = math.nan,
 ) -> dict[str, float]:
     """Every factor and axis of the term table that belongs to the whole boat.
 
@@ -52,6 +53,7 @@ def boat_features(
     depth : D0, depth of the sail top [m].
     revolutions : n [1/s].
     advance : J, advance coefficient.
+    slip : epsilon of ``slipstream``.
 
     Returns
     -------
@@ -74,7 +76,34 @@ def boat_features(
     found["beta"] = math.asin(max(-1.0, min(1.0, v / speed))) if speed else 0.0
     found["D0"] = depth
     found["n"], found["|n|"], found["J"] = revolutions, abs(revolutions), advance
+    found["slip"], found["uslip"] = slip, slip * u
     return found
+
+
+def slipstream(ahead: float, revolutions: float, pitch: float, loading: float) -> float:
+    """What the propeller adds to the flow at the stern over self-propulsion, Healey and Lienard (1993).
+
+    epsilon = -1 + sgn(n)/sgn(u) (sqrt(C_T + 1) - 1) / (sqrt(C_T1 + 1) - 1) with C_T = C_T1 eta |eta| and
+    eta = J_0 n D/u; zero in self-propulsion, where eta = 1.
+
+    Parameters
+    ----------
+    ahead : u [m/s].
+    revolutions : n [1/s].
+    pitch : J_0 D, advance of a revolution in self-propulsion [m].
+    loading : C_T1, thrust loading of self-propulsion.
+
+    Examples
+    --------
+    >>> slipstream(1.8, 9.0, 0.2, 1.2)
+    0.0
+    """
+    if not loading > 0.0 or ahead == 0.0:
+        return 0.0
+    eta = pitch * revolutions / ahead
+    sense = math.copysign(1.0, ahead) * (math.copysign(1.0, revolutions) if revolutions else 0.0)
+    load = max(-1.0, loading * eta * abs(eta))
+    return -1.0 + sense * (math.sqrt(load + 1.0) - 1.0) / (math.sqrt(loading + 1.0) - 1.0)
 
 
 def plane_features(

@@ -127,6 +127,19 @@ class Propeller(Data):
     position: Place | None = None
 
 
+class Rudder(Data):
+    """Size of a ship's rudder; a plane named ``rudder`` says where it is and how it turns.
+
+    Attributes
+    ----------
+    area : A_R, of the part that moves [m2].
+    height : H_R, its span [m].
+    """
+
+    area: Annotated[Number, _stated("m2", positive=True)]
+    height: Length
+
+
 class Mixer(Data):
     """Share of the vertical and horizontal command in a plane's deflection, Eq. (1).
 
@@ -270,12 +283,14 @@ class Vehicle(Data):
     title : For people.
     source : Where the file comes from.
     term_set : ``reduced``: tables over speed, angle and depth. ``gertler_hagen``: constant coefficients.
-        ``mmg``: ships in surge, sway and yaw.
+        ``mmg``: ships in surge, sway and yaw, with rudder and propeller. ``auv``: slender vehicles with
+        cross-flow axis by axis and fins. ``nps_auv``: the terms of Healey and Lienard (1993).
     added_mass : ``derivatives`` of the whole boat, or ``sections`` along it.
     frame : Axes of every vector of the file.
     particulars : Mass, inertia and reference points.
     propeller : The propeller; a bare hull has none until a flight asks for it.
     planes : Control planes.
+    rudder : Size of a ship's rudder, for the set ``mmg``.
     sections : Added-mass sections; with ``added_mass = "sections"``.
     tanks : Ballast and trim tank, where the boat has them.
     geometry : File of its surface, beside this one; waves need it.
@@ -287,12 +302,13 @@ class Vehicle(Data):
     name: Name
     title: str
     source: str
-    term_set: Literal["reduced", "gertler_hagen", "mmg"]
+    term_set: Literal["reduced", "gertler_hagen", "mmg", "auv", "nps_auv"]
     added_mass: Literal["sections", "derivatives"]
     frame: Axes
     particulars: Particulars
     propeller: Propeller | None = None
     planes: list[Plane] = Field(default_factory=list)
+    rudder: Rudder | None = None
     sections: Sections | None = None
     tanks: Tanks | None = None
     geometry: str | None = None

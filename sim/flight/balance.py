@@ -12,7 +12,7 @@ from math import cos, sin, sqrt
 import numpy as np
 
 from sim.compiled import inner, outer
-from sim.kernel.layout import DIAMETER, HAS_TANKS, N_PLANES, PHI, SHIFT, THETA, Around, Z
+from sim.kernel.layout import DIAMETER, HAS_TANKS, HELD, N_PLANES, PHI, SHIFT, THETA, Around, Z
 from sim.kernel.rhs import fill_rate
 
 # Unknowns, and what keeps the boat level.
@@ -71,6 +71,35 @@ def place(
         c[planes + 1], c[planes + 2] = level[BALLAST], level[TRIM_TANK]
 
 
+@outer
+def hold(w: np.ndarray, x: np.ndarray, dy: np.ndarray) -> None:
+    """Residuals of held heave, roll and pitch: pitch, heel and dV, which are zero there."""
+    if w[HELD] & 4:
+        dy[2] = x[1]
+    if w[HELD] & 8:
+        dy[3] = x[3]
+    if w[HELD] & 16:
+        dy[4] = x[2]
+
+
+@inner
+def _residuals(
+    m: np.ndarray,
+    w: np.ndarray,
+    x: np.ndarray,
+    y: np.ndarray,
+    c: np.ndarray,
+    near: Around,
+    s: np.ndarray,
+    k: np.ndarray,
+    dy: np.ndarray,
+) -> None:
+    """Accelerations of a state, and what stands for those that are held."""
+    fill_rate(m, w, y, c, near, s, k, dy)
+    if w[HELD]:
+        hold(w, x, dy)
+
+
 @inner
 def _solve(a: np.ndarray) -> bool:
     """Six equations with their right side as a column, solved into it; false when singular."""
@@ -127,7 +156,7 @@ def balance(
     # The last step counts when it gains.
     for _ in range(_ITERATIONS):
         place(m, w, x, speed, z, mixer, free, level, size, upright, s, y, c)
-        fill_rate(m, w, y, c, near, s, k, dy)
+        _residuals(m, w, x, y, c, near, s, k, dy)
         norm, largest = 0.0, 0.0
         for i in range(N_X):
             a[_RESIDUAL + i] = dy[i]
@@ -141,7 +170,7 @@ def balance(
             x[j] = kept + h
             h = x[j] - kept
             place(m, w, x, speed, z, mixer, free, level, size, upright, s, y, c)
-            fill_rate(m, w, y, c, near, s, k, dy)
+            _residuals(m, w, x, y, c, near, s, k, dy)
             x[j] = kept
             for i in range(N_X):
                 a[_SYSTEM + (N_X + 1) * i + j] = (dy[i] - a[_RESIDUAL + i]) / h
@@ -155,7 +184,7 @@ def balance(
                 for i in range(N_X):
                     x[i] = a[_X + i] + share * a[_SYSTEM + (N_X + 1) * i + N_X]
                 place(m, w, x, speed, z, mixer, free, level, size, upright, s, y, c)
-                fill_rate(m, w, y, c, near, s, k, dy)
+                _residuals(m, w, x, y, c, near, s, k, dy)
                 now = 0.0
                 for i in range(N_X):
                     now += dy[i] * dy[i]
@@ -167,6 +196,6 @@ def balance(
             for i in range(N_X):
                 x[i] = a[_X + i]
             place(m, w, x, speed, z, mixer, free, level, size, upright, s, y, c)
-            fill_rate(m, w, y, c, near, s, k, dy)
+            _residuals(m, w, x, y, c, near, s, k, dy)
             return largest
     return largest

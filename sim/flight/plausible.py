@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+from sim.boat.catalogue import held
 from sim.files.errors import InputError
 from sim.flight.trim import NoEquilibrium
 
@@ -29,13 +30,20 @@ def check_start(case: Case, vehicle: Vehicle) -> None:
     Raises
     ------
     InputError
-        For a boat more than its length above the surface or below the sea floor, or faster than 100 m/s.
+        For a boat more than its length above the surface or below the sea floor, or faster than 100 m/s; for
+        waves, heel or pitch of a vehicle whose set holds them.
     """
     first, length = case.initial, vehicle.particulars.length.value
     where = f"case {case.name}, key initial"
     if not -length <= first.depth_m <= _DEEPEST:
         allowed = f"a depth of the sail top from {-length:g} m, in the air, to {_DEEPEST:g} m"
         raise InputError(f"{where}.depth_m", f"{first.depth_m:g} m", allowed)
+    still = held(vehicle.term_set)
+    if still and (case.waves or case.environment.free_surface or first.heel_deg or first.pitch_deg):
+        text = "calm water, no heel and no pitch"
+        raise InputError(
+            f"case {case.name}", f"motions that {vehicle.name} does not have ({' '.join(still)} held)", text
+        )
     if first.speed_mps > _FASTEST:
         raise InputError(f"{where}.speed_mps", f"{first.speed_mps:g} m/s", f"{_FASTEST:g} m/s at most")
 

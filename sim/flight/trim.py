@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.flight.balance import DV, SCRATCH, balance, place
+from sim.flight.balance import DV, SCRATCH, balance, hold, place
 from sim.kernel.layout import Model, workspace
 from sim.kernel.rhs import fill_rate
 
@@ -88,6 +88,7 @@ def _solve(
     def residual(x: Array) -> Array:
         place(m, w, x, *boat, work.real, state, controls)
         fill_rate(m, w, state, controls, (), work.real, work.whole, derivative)
+        hold(w, x, derivative)
         return derivative[:6].copy()
 
     # n relative to U/D: an advance coefficient near one.

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-from sim.boat.catalogue import BOAT_FEATURES, OUTPUTS, PLANE_FEATURES, feature_index
+from sim.boat.catalogue import BOAT_FEATURES, OUTPUTS, PLANE_FEATURES, feature_index, held, terms
 from sim.boat.coefficients import Coefficient, Coefficients
 from sim.boat.mass import (
     Environment,
@@ -18,6 +18,7 @@ from sim.boat.mass import (
     unit_added_masses,
 )
 from sim.boat.vehicle import Vehicle
+from sim.files.errors import InputError
 from sim.kernel import layout
 from sim.kernel.layout import Group, Model
 
@@ -149,7 +150,7 @@ def weight_across(model: Model, lateral: float) -> Model:
     moved = np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]]) + second
     return model.replaced(
         mass_matrix=mass,
-        inverse_mass=np.linalg.inv(mass),
+        inverse_mass=_inverse(mass, model.held),
         r_g=(x, y + lateral, z),
         inertia=[moved[i, j] for i, j in _INERTIA],
     )
@@ -159,7 +160,7 @@ def _batches(coefficients: Coefficients) -> Iterable[list[Coefficient]]:
     """Coefficients that share their axes, one a slot, in the order of the kernel."""
     groups: dict[tuple[object, ...], list[list[Coefficient]]] = {}
     for coefficient in coefficients:
-        if coefficient.term.is_acceleration or coefficient.term.name == "w_T":
+        if coefficient.term.is_acceleration or not (coefficient.term.output or coefficient.term.name == "t"):
             continue
         batches = groups.setdefault(_group_key(coefficient), [])
         slot = _slot(coefficient)
@@ -170,6 +171,52 @@ def _batches(coefficients: Coefficients) -> Iterable[list[Coefficient]]:
             free.append(coefficient)
     for batches in groups.values():
         yield from batches
+
+
+def _inverse(mass: Array, held: Sequence[int]) -> Array:
+    """Accelerations of a unit load, none where a motion is held."""
+    free = [i for i in range(6) if i not in held]
+    inverse = np.zeros((6, 6))
+    inverse[np.ix_(free, free)] = np.linalg.inv(mass[np.ix_(free, free)])
+    return inverse
+
+
+def _ship_kinds(coefficients: Coefficients) -> tuple[bool, int]:
+    """Whether a ship's propeller is given, and the place of its rudder among the planes, -1 without.
+
+    Raises
+    ------
+    InputError
+        For one of them that is given in part.
+    """
+    vehicle, there = coefficients.vehicle, {c.term.name for c in coefficients}
+    names = [p.name for p in vehicle.planes]
+    found = {}
+    for group in ("ship propeller", "ship rudder", "propeller interaction"):
+        wanted = [t.name for t in terms(vehicle.term_set) if t.group == group and not t.output]
+        missing = [n for n in wanted if n not in there]
+        found[group] = bool(wanted) and not missing
+        if missing and len(missing) < len(wanted):
+            text = f"all of the group {group}: without {', '.join(missing)} its loads are not known"
+            raise InputError(f"vehicle {vehicle.name}", ", ".join(n for n in wanted if n in there), text)
+    if not found["ship rudder"]:
+        return found["ship propeller"], -1
+    if not found["ship propeller"] or vehicle.rudder is None or "rudder" not in names:
+        text = "a propeller, the table [rudder] and a plane of that name: its flow depends on them"
+        raise InputError(f"vehicle {vehicle.name}", "coefficients of a rudder alone", text)
+    return True, names.index("rudder")
+
+
+def _ship_numbers(coefficients: Coefficients, environment: Environment) -> Array:
+    """Values of ``layout.SHIP_PLACES``."""
+    vehicle = coefficients.vehicle
+    values = {c.term.name: float(c.values[0]) for c in coefficients if not c.term.output and not c.term.axes}
+    values["J_0 D"] = values.get("J_0", 0.0) * vehicle.diameter
+    values |= {"density": environment.density, "length": vehicle.particulars.length.value}
+    if vehicle.rudder is not None:
+        values |= {"A_R": vehicle.rudder.area.value, "H_R": vehicle.rudder.height.value}
+        values["x_R"] = next(p.position[0] for p in vehicle.planes if p.name == "rudder")
+    return np.array([values.get(name, 0.0) for name in layout.SHIP_PLACES])
 
 
 def assemble(coefficients: Coefficients, environment: Environment) -> Model:
@@ -193,6 +240,7 @@ def assemble(coefficients: Coefficients, environment: Environment) -> Model:
     particulars = vehicle.particulars
     added = added_mass_matrix(coefficients, environment)
     total = mass + added
+    still = [OUTPUTS.index(o) for o in held(vehicle.term_set)]
     numbers = {
         "mass": particulars.mass.value,
         "weight": particulars.mass.value * environment.gravity,
@@ -205,7 +253,8 @@ def assemble(coefficients: Coefficients, environment: Environment) -> Model:
         "wake": float(wake.values[0]) if wake else 0.0,
         "mass_matrix": total,
         "added_mass": added,
-        "inverse_mass": np.linalg.inv(total),
+        "inverse_mass": _inverse(total, still),
+        "ship": _ship_numbers(coefficients, environment),
     }
     planes = [[*p.position, *p.lift_axis] for p in vehicle.planes]
     return layout.pack(
@@ -216,6 +265,8 @@ def assemble(coefficients: Coefficients, environment: Environment) -> Model:
         groups=tuple(flat.groups),
         multipliers=np.array(list(flat.multipliers), dtype=np.int64).reshape(-1, layout.MAX_FACTORS),
         data=np.concatenate(flat.data),
+        ship=_ship_kinds(coefficients),
+        held=still,
     )
 
 
@@ -253,6 +304,8 @@ class Assembly:
         self._rigid = rigid_body_matrix(coefficients.vehicle)[0]
         wake = coefficients.get("w_T")
         self._wake = int(places[wake.term.name, wake.part][0]) if wake else None
+        self._ship = {c.term.name: int(places[c.term.name, c.part][0]) for c in coefficients if not c.term.output}
+        self._diameter = coefficients.vehicle.diameter
 
     def model(self, values: Array) -> Model:
         """The kernel's model at (rows,) values, in the order of the rows of the coefficients."""
@@ -263,6 +316,16 @@ class Assembly:
             data=(self._data @ values).reshape(-1, layout.WIDTH),
             mass_matrix=total,
             added_mass=added,
-            inverse_mass=np.linalg.inv(total),
+            inverse_mass=_inverse(total, self._base.held),
+            ship=self._ship_at(values),
             wake=0.0 if self._wake is None else float(values[self._wake]),
         )
+
+    def _ship_at(self, values: Array) -> Array:
+        ship = self._base.ship.copy()
+        for k, name in enumerate(layout.SHIP_TERMS):
+            if name in self._ship:
+                ship[k] = values[self._ship[name]]
+        if "J_0" in self._ship:
+            ship[layout.SHIP_PLACES.index("J_0 D")] = values[self._ship["J_0"]] * self._diameter
+        return ship

@@ -12,6 +12,7 @@ more, ballast [kg] and the shift of the centre of gravity by the trim tank [m, f
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple, TypeAlias
 
@@ -42,8 +43,14 @@ WIDTH = N_OUT
 # Model, floats.
 MASS, WEIGHT, BUOYANCY, SAIL_TOP, DIAMETER, WAKE = range(6)
 R_G, R_B, INERTIA, TANK = 6, 9, 12, 18
-INVERSE_MASS, MASS_MATRIX, ADDED_MASS = 24, 60, 96
-PLANES = 132
+INVERSE_MASS, MASS_MATRIX, ADDED_MASS, SHIP = 24, 60, 96, 132
+# What ``sim.kernel.ship`` reads: rows of the term table without a load, then numbers of the vehicle and the water.
+SHIP_TERMS = (
+    *("t_P", "w_P0", "C_1", "C_2+", "C_2-", "x_P", "k_0", "k_1", "k_2"),
+    *("t_R", "a_H", "x_H", "gamma_R+", "gamma_R-", "l_R", "kappa", "epsilon", "f_alpha", "C_T1"),
+)
+SHIP_PLACES = (*SHIP_TERMS, "J_0 D", "density", "length", "A_R", "H_R", "x_R")
+PLANES = SHIP + len(SHIP_PLACES)
 PLANE_WIDTH = 6
 
 # Model, whole numbers: how many there are, then where they start, in floats or in whole numbers.
@@ -54,7 +61,9 @@ KINDS = 5
 AT_AXES, AT_MULTIPLIERS, AT_GROUPS, AT_DATA = 10, 11, 12, 13
 # Where fractions and multipliers stand in the scratch.
 AT_FRACTIONS, AT_PRODUCTS, SCRATCH = 14, 15, 16
-HEADER = 17
+# A ship's propeller and rudder, and the rudder's place among the planes; heave, roll and pitch that are held.
+HAS_PROPELLER, HAS_RUDDER, RUDDER, HELD = 17, 18, 19, 20
+HEADER = 21
 # An axis: feature, rule, first node, nodes, first cell. A cell: range, origin, slope and base.
 AXIS, CELL = 5, 5
 # Factors of a multiplier.
@@ -113,7 +122,8 @@ class Model:
     mass, weight, buoyancy : [kg, N, N]. r_g, r_b : (3,) [m].
     inertia : (6,) Ixx Iyy Izz Ixy Ixz Iyz [kg m^2]. diameter : [m]. wake : w_T.
     sail_top : D0 = z + sail_top [m]. tank : (3,) where ballast is taken [m].
-    mass_matrix : (6, 6) rigid-body plus added mass; added_mass : of it; inverse_mass.
+    mass_matrix : (6, 6) rigid-body plus added mass; added_mass : of it; inverse_mass, with zeros
+        where a motion is held. ship : of ``SHIP_PLACES``; zero for what a vehicle does not have.
     planes : (planes, 6) position [m] and lift axis. has_tanks : Whether they are in use.
     data : (rows, 8) dimensional coefficients at the nodes.
     """
@@ -130,7 +140,7 @@ class Model:
     sail_top, diameter, wake = _Scalar(SAIL_TOP), _Scalar(DIAMETER), _Scalar(WAKE)
     r_g, r_b, inertia, tank = _Block(R_G, 3), _Block(R_B, 3), _Block(INERTIA, 6), _Block(TANK, 3)
     inverse_mass, mass_matrix = _Block(INVERSE_MASS, 6, 6), _Block(MASS_MATRIX, 6, 6)
-    added_mass = _Block(ADDED_MASS, 6, 6)
+    added_mass, ship = _Block(ADDED_MASS, 6, 6), _Block(SHIP, len(SHIP_PLACES))
 
     @property
     def planes(self) -> Array:
@@ -148,6 +158,11 @@ class Model:
     def has_tanks(self) -> bool:
         """Whether ballast and trim tank are in use."""
         return bool(self.whole[HAS_TANKS])
+
+    @property
+    def held(self) -> list[int]:
+        """Heave, roll and pitch that are held, as places of u v w p q r."""
+        return [i for i in range(6) if int(self.whole[HELD]) & (1 << i)]
 
     def replaced(self, tanks: bool | None = None, **values: Any) -> Model:
         """A copy with some of its numbers changed, by name."""
@@ -243,8 +258,13 @@ def pack(
     groups: tuple[Group, ...],
     multipliers: Whole,
     data: Array,
+    ship: tuple[bool, int] = (False, -1),
+    held: Sequence[int] = (),
 ) -> Model:
-    """A model from its parts; arguments as the attributes of ``Model``, ``numbers`` by name."""
+    """A model from its parts; arguments as the attributes of ``Model``, ``numbers`` by name.
+
+    ``ship`` says whether there is a propeller of ``SHIP_TERMS``, and which plane is the rudder of them.
+    """
     one = FEATURES + N_BOAT + N_PLANE * len(planes)
     cells = [_cells(nodes[first : first + n], rule) for _, rule, first, n in axes]
     floats = [np.zeros(PLANES), planes.ravel(), nodes, *(c.ravel() for c in cells)]
@@ -279,6 +299,8 @@ def pack(
     header[N_GROUPS : N_GROUPS + KINDS] = count
     header[[AT_AXES, AT_MULTIPLIERS, AT_GROUPS, AT_DATA]] = *at, at_data
     header[[AT_FRACTIONS, AT_PRODUCTS]] = fractions, fractions + len(axes)
+    header[HAS_PROPELLER], header[HAS_RUDDER], header[RUDDER] = ship[0], ship[1] >= 0, max(ship[1], 0)
+    header[HELD] = sum(1 << i for i in held)
     header[SCRATCH] = fractions + len(axes) + len(multipliers)
     model = Model(real, np.concatenate(whole), axes, nodes, groups, multipliers, len(data))
     return model.replaced(**numbers)

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.boat.catalogue import BOAT_FEATURES
-from sim.boat.forces import boat_features
+from sim.boat.forces import boat_features, slipstream
 from sim.boat.mass import cross_matrix
 from sim.kernel import layout
 from sim.kernel.layout import Model
@@ -37,12 +37,45 @@ def features(m: Model, y: Array, c: Array) -> Array:
     n_planes = len(m.planes)
     n = float(c[n_planes])
     advance = (1.0 - m.wake) * y[0] / (n * m.diameter) if n else 0.0
-    boat = boat_features(list(y[:3]), list(y[3:6]), y[8] + m.sail_top, n, advance)
+    of = _ship(m)
+    slip = slipstream(float(y[0]), n, of["J_0 D"], of["C_T1"])
+    boat = boat_features(list(y[:3]), list(y[3:6]), y[8] + m.sail_top, n, advance, slip)
     through = y[:3] + np.cross(y[3:6], m.planes[:, :3])
     speed = np.linalg.norm(through, axis=1)
     sine = -np.einsum("ij,ij->i", through, m.planes[:, 3:]) / np.where(speed > 0.0, speed, 1.0)
     plane = np.column_stack([speed, c[:n_planes] + np.arcsin(np.clip(sine, -1.0, 1.0)), c[:n_planes]])
     return np.concatenate([[boat[k] for k in BOAT_FEATURES], plane.reshape(-1), [1.0]])
+
+
+def _ship(m: Model) -> dict[str, float]:
+    return dict(zip(layout.SHIP_PLACES, m.ship.tolist(), strict=True))
+
+
+def ship_loads(m: Model, f: Array) -> Array:
+    """X Y Z K M N of a ship's propeller and rudder, the equations of Yasukawa and Yoshimura (2015) one by one."""
+    total, of = np.zeros(6), _ship(m)
+    u, v, r, speed, n = (float(f[BOAT_FEATURES.index(k)]) for k in ("u", "v", "r", "U", "n"))
+    beta, yaw = math.atan2(-v, u), r * of["length"] / speed
+    beta_p, beta_r = beta - of["x_P"] * yaw, beta - of["l_R"] * yaw
+    c_2 = of["C_2+"] if beta_p > 0.0 else of["C_2-"]
+    one_less_w = (1.0 - of["w_P0"]) * (1.0 + (1.0 - math.exp(-of["C_1"] * abs(beta_p))) * (c_2 - 1.0))
+    advance = u * one_less_w / (n * m.diameter)
+    k_t = of["k_0"] + of["k_1"] * advance + of["k_2"] * advance**2
+    total[0] = (1.0 - of["t_P"]) * of["density"] * n**2 * m.diameter**4 * k_t
+    if not m.whole[layout.HAS_RUDDER]:
+        return total
+    quicker = math.sqrt(1.0 + 8.0 * k_t / (math.pi * advance**2)) - 1.0
+    eta = m.diameter / of["H_R"]
+    u_r = of["epsilon"] * u * one_less_w * math.sqrt(eta * (1.0 + of["kappa"] * quicker) ** 2 + 1.0 - eta)
+    v_r = speed * beta_r * (of["gamma_R+"] if beta_r > 0.0 else of["gamma_R-"])
+    delta = f[len(BOAT_FEATURES) + 3 * int(m.whole[layout.RUDDER]) + 2]
+    normal = (
+        0.5 * of["density"] * of["A_R"] * (u_r**2 + v_r**2) * of["f_alpha"] * math.sin(delta - math.atan(v_r / u_r))
+    )
+    total[0] -= (1.0 - of["t_R"]) * normal * math.sin(delta)
+    total[1] -= (1.0 + of["a_H"]) * normal * math.cos(delta)
+    total[5] -= (of["x_R"] + of["a_H"] * of["x_H"] * of["length"]) * normal * math.cos(delta)
+    return total
 
 
 def loads(m: Model, f: Array) -> Array:
@@ -58,7 +91,7 @@ def loads(m: Model, f: Array) -> Array:
             place = np.add.outer(place, np.array([i, i + 1]) * stride).reshape(-1)
         total += (weight @ m.data[place]) * products[list(multipliers)]
     total[0] += (1.0 - total[layout.OUT_DEDUCTION]) * total[layout.OUT_THRUST]
-    return total[:6]
+    return total[:6] + ship_loads(m, f) if m.whole[layout.HAS_PROPELLER] else total[:6]
 
 
 def rhs(m: Model, y: Array, c: Array) -> Array:

@@ -20,6 +20,7 @@ from sim.kernel.layout import (
     DIAMETER,
     FEATURES,
     FIRST_PLANE,
+    HAS_PROPELLER,
     HAS_TANKS,
     INERTIA,
     LOADS,
@@ -41,6 +42,7 @@ from sim.kernel.layout import (
     Work,
     Z,
 )
+from sim.kernel.ship import LOADING, add_ship_loads, fill_slipstream
 from sim.kernel.tables import add_up_loads
 from sim.waves.surroundings import add_loads, near_of, observe, plane_inflow, propeller_inflow, relative, tick
 
@@ -117,7 +119,16 @@ def _features(m: np.ndarray, w: np.ndarray, y: np.ndarray, c: np.ndarray, near: 
     through, at = relative(near, y)
     planes = w[N_PLANES]
     _fill_boat(m, through, at, y[0] - propeller_inflow(near, planes), c[planes], s)
+    if m[LOADING] > 0.0:
+        fill_slipstream(m, s)
     _fill_planes(m, w, y, c, near, s)
+
+
+@inlined
+def _loads(m: np.ndarray, w: np.ndarray, s: np.ndarray, k: np.ndarray) -> None:
+    add_up_loads(m, w, s, k)
+    if w[HAS_PROPELLER]:
+        add_ship_loads(m, w, s)
 
 
 @inlined
@@ -134,7 +145,7 @@ def _rate(
     """Time derivative of the state, Eqs. (12)-(16) as corrected, added mass on the left."""
     observe(near, y)
     _features(m, w, y, c, near, s)
-    add_up_loads(m, w, s, k)
+    _loads(m, w, s, k)
     if w[HAS_TANKS]:
         add_tank_loads(m, w, y, c, s)
     add_loads(near, y, s)
@@ -202,7 +213,7 @@ def fill_features(m: np.ndarray, w: np.ndarray, y: np.ndarray, c: np.ndarray, ne
 @outer
 def fill_loads(m: np.ndarray, w: np.ndarray, s: np.ndarray, k: np.ndarray) -> None:
     """Hydrodynamic loads of the features in the scratch, into the scratch."""
-    add_up_loads(m, w, s, k)
+    _loads(m, w, s, k)
 
 
 @outer
