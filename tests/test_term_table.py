@@ -14,7 +14,7 @@ from sim.boat import catalogue
 from sim.boat.catalogue import ACCELERATIONS, OUTPUTS, CatalogueError
 from sim.boat.coefficients import Coefficients
 from sim.boat.database import axis_columns
-from sim.boat.forces import boat_features, multiplier, plane_features
+from sim.boat.forces import boat_features, multiplier, plane_features, slipstream
 from sim.boat.mass import Environment, added_mass_matrix
 from sim.boat.parts import mirror_of, parts_of, vehicle_terms
 from sim.boat.vehicle import load_vehicle
@@ -41,6 +41,8 @@ DIMENSIONS = {
     "r/U": (-1, 0),
     "v/r": (1, 0),
     "w/q": (1, 0),
+    "slip": (0, 0),
+    "uslip": SPEED,
 }
 UNITS = {"m/s": (1, -1), "m": (1, 0), "rad/s": (0, -1), "m/s2": (1, -2), "rad2/s2": (0, -2), "deg": (0, 0), "1": (0, 0)}
 SUFFIX = {"m/s": "mps", "m": "m", "rad/s": "radps", "m/s2": "mps2", "rad2/s2": "rad2ps2", "deg": "deg"}
@@ -49,6 +51,10 @@ SUFFIX = {"m/s": "mps", "m": "m", "rad/s": "radps", "m/s2": "mps2", "rad2/s2": "
 @BY_NAME
 def test_scale_times_monomial_is_newton_or_newton_metre(term_set, term):
     metre = second = kilogram = 0
+    if term.norm == "SI":
+        # The coefficient has what is missing: no power of a length beside it.
+        assert term.power == 0
+        return
     if term.norm:
         # rho is kg m^-3; the length (L or D) carries the power of the row.
         kilogram, metre = 1, term.power - 3
@@ -62,7 +68,7 @@ def test_scale_times_monomial_is_newton_or_newton_metre(term_set, term):
 def test_scale_is_the_declared_power_of_the_declared_length():
     rho, length, diameter = 1000.0, 3.0, 2.0
     for _, term in ALL:
-        size = {"rho/2 L": 500.0 * 3.0**term.power, "rho D": 1000.0 * 2.0**term.power, "": 1.0}[term.norm]
+        size = {"rho/2 L": 500.0 * 3.0**term.power, "rho D": 1000.0 * 2.0**term.power, "SI": 1.0, "": 1.0}[term.norm]
         assert term.scale(rho, length, diameter) == pytest.approx(size, rel=1e-15), term.name
 
 
@@ -99,8 +105,8 @@ def _mirrored_features(rng):
     """Features of a state and of its mirror image: v, p, r change sign and nothing else."""
     velocity, rates = rng.normal(size=3), rng.normal(size=3)
     turn = np.array([1.0, -1.0, 1.0])
-    here = boat_features(velocity, rates, 20.0, 1.2, 0.7)
-    there = boat_features(velocity * turn, -rates * turn, 20.0, 1.2, 0.7)
+    here = boat_features(velocity, rates, 20.0, 1.2, 0.7, 0.3)
+    there = boat_features(velocity * turn, -rates * turn, 20.0, 1.2, 0.7, 0.3)
     acceleration = dict(zip(ACCELERATIONS, rng.normal(size=6), strict=True))
     sign = dict(zip(ACCELERATIONS, (1, -1, 1, -1, 1, -1), strict=True))
     return here | acceleration, there | {k: sign[k] * a for k, a in acceleration.items()}
@@ -112,7 +118,7 @@ def test_parity_of_hull_rows_follows_from_the_mirror_of_the_state(term_set):
     load_sign = dict(zip(OUTPUTS, (1, -1, 1, -1, 1, -1), strict=True)) | {"": 1}
     rows = [t for t in catalogue.terms(term_set) if not set(t.factors) & set(catalogue.PLANE_FEATURES)]
     assert len(rows) > (20 if term_set == "mmg" else 60)
-    for term in rows:
+    for term in (t for t in rows if t.output):
         ratio = multiplier(term, there) / multiplier(term, here)
         assert abs(ratio) == pytest.approx(1.0, abs=1e-14)
         # C(mirrored axes) * m' = sign(load) * C(axes) * m
@@ -146,17 +152,27 @@ def test_parity_of_plane_rows_follows_from_the_mirrored_plane():
 
 
 def _vehicle_for(term_set, term):
-    boats = [load_vehicle(name) for name in ("bb2", "suboff")]
+    boats = [load_vehicle(name) for name in ("bb2", "suboff", "nps-auv2", "kvlcc2-mmg")]
     vehicle = next(v for v in boats if term.part == "section" or term.part in v.part_names())
     kind = "derivatives" if term.group == "added mass" else "sections"
     return vehicle.model_copy(update={"term_set": term_set, "added_mass": kind})
+
+
+# What a slipstream is of, for terms that it multiplies.
+SLIPSTREAM = {"J_0": 0.7, "C_T1": 1.2}
 
 
 def _single(vehicle, term, part, value, heave):
     row = dict.fromkeys(axis_columns(), np.nan) | {"coefficient": term.name, "part": part, "value": value}
     # One run: a constant, on the side of the heave speed (a side without runs has none).
     row |= {catalogue.axes()[a].column: np.sign(heave) if a == "sgn(w)" else 1.0 for a in term.axes}
-    return Coefficients(vehicle, pd.DataFrame([row]))
+    rows = [row]
+    if {"slip", "uslip"} & set(term.factors):
+        rows += [
+            dict.fromkeys(row, np.nan) | {"coefficient": k, "part": "propeller", "value": v}
+            for k, v in SLIPSTREAM.items()
+        ]
+    return Coefficients(vehicle, pd.DataFrame(rows))
 
 
 @BY_NAME
@@ -181,7 +197,8 @@ def test_a_coefficient_alone_forward_through_the_model_and_back_is_itself(term_s
     work, controls = workspace(model), rng.normal(size=len(vehicle.planes) + 1)
     kernel.features(model, state, controls, work)
     kernel.loads(model, work)
-    features = boat_features(state[:3], state[3:6], 0.0, controls[-1], 0.0)
+    slip = slipstream(state[0], controls[-1], SLIPSTREAM["J_0"] * vehicle.diameter, SLIPSTREAM["C_T1"])
+    features = boat_features(state[:3], state[3:6], 0.0, controls[-1], 0.0, slip)
     for plane, angle in zip(vehicle.planes, controls, strict=False):
         if plane.name == part:
             features |= plane_features(plane, state[:3], state[3:6], angle)

@@ -42,7 +42,7 @@ def boat_features(
     depth: float,
     revolutions: float = math.nan,
     advance: float = math.nan,
-    slip: float = math.nan,
+    slip: float = 0.0,
 ) -> dict[str, float]:
     """Every factor and axis of the term table that belongs to the whole boat.
 
@@ -53,7 +53,7 @@ def boat_features(
     depth : D0, depth of the sail top [m].
     revolutions : n [1/s].
     advance : J, advance coefficient.
-    slip : epsilon of ``slipstream``.
+    slip : epsilon of ``slipstream``; zero for a set that has none.
 
     Returns
     -------

@@ -91,7 +91,7 @@ def mirror_of(term: Term, part: str, vehicle: Vehicle) -> Mirror:
     Mirror with C_mirror(axis_signs * x) = sign * C(x).
     """
     planes = {p.name: p for p in vehicle.planes}
-    if part not in planes:
+    if part not in planes or not term.output:
         signs = tuple(catalogue.axes()[a].mirror for a in term.axes)
         return Mirror(term.name, part, term.mirror_sign(), signs)
     partner = planes[planes[part].mirror]
