@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 @VERSION
 @OUT
 @json_to("Write the comparison as JSON.")
+@click.option("--figures", type=click.Choice(["png", "svg", "pdf"]), default="png", show_default=True, help="Format.")
 @click.option("--strict", is_flag=True, help="Exit 1 when a tolerance of a case file is missed.")
 @click.option("--samples", type=click.IntRange(min=2), default=None, help="Draw so many coefficient sets; error bands.")
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Seed of the draws.")
@@ -57,6 +58,7 @@ def validate(
     version: int | None,
     out: Path,
     json_path: str | None,
+    figures: str,
     strict: bool,
     samples: int | None,
     seed: int,
@@ -101,11 +103,11 @@ def validate(
 
     if samples:
         done = _with_bands(done, samples, seed, dask, console)
-        board = board and _board_with_bands(board, done, out, console)
+        board = board and _board_with_bands(board, done, out, console, figures)
     for one in done:
-        figure = case_figure(one, out / f"{in_file_name(one.case.name)}_v{one.version}.png", one.bands)
+        figure = case_figure(one, out / f"{in_file_name(one.case.name)}_v{one.version}.{figures}", one.bands)
         console.print(f"figure: {on_screen(figure)}", highlight=False)
-    for figure in _sea_figures(done, out):
+    for figure in _sea_figures(done, out, figures):
         console.print(f"figure: {on_screen(figure)}", highlight=False)
     if json_path:
         result = done[0].to_dict() if board is None else board
@@ -118,13 +120,14 @@ def validate(
         raise click.exceptions.Exit(1)
 
 
-def _sea_figures(done: list[Validation], out: Path) -> list[Path]:
+def _sea_figures(done: list[Validation], out: Path, kind: str) -> list[Path]:
     """Further figures of cases in waves."""
     if not any(one.case.waves for one in done):
         return []
     from ident.validation.wave_case_figures import harmonics_over_depth, sea_figures
 
-    return [figure for one in done for figure in sea_figures(one, out)] + harmonics_over_depth(done, out)
+    own = [figure for one in done for figure in sea_figures(one, out, kind)]
+    return own + harmonics_over_depth(done, out, kind)
 
 
 def _one(
@@ -161,7 +164,9 @@ def _with_bands(done: list[Validation], samples: int, seed: int, dask: str | Non
     return found
 
 
-def _board_with_bands(board: dict[str, Any], done: list[Validation], out: Path, console: Any) -> dict[str, Any]:
+def _board_with_bands(
+    board: dict[str, Any], done: list[Validation], out: Path, console: Any, kind: str
+) -> dict[str, Any]:
     """The board with bands and coverage case by case and over all references; draws the reliability diagram."""
     from ident.validation import reliability as reliable
 
@@ -173,7 +178,7 @@ def _board_with_bands(board: dict[str, Any], done: list[Validation], out: Path, 
     points = reliable.reliability(ranks)
     reliable.show_coverage(coverage, "all references", console)
     if points:
-        path = out / f"reliability_v{board['database']['version']}.png"
+        path = out / f"reliability_v{board['database']['version']}.{kind}"
         console.print(f"figure: {reliable.reliability_figure(points, path)}", highlight=False)
     return board | {"cases": cases, "coverage": coverage, "reliability": points}
 

@@ -41,6 +41,10 @@ _LABELS = {
     "u_over_U0": "surge speed u/U0",
     "dz_over_L0": "depth change dz/L",
 }
+# Columns of a flight that are neither channels nor planes.
+_NO_PLANES = ("t", "dV", "dH")
+# The angle at which a zigzag reverses, and the command that is reversed.
+_REVERSED_BY = {"psi": "dH", "theta": "dV"}
 _ALONG = {"t": "time t [s]", "s": "path length over ground s [m]"}
 _STYLE = {"EXP": ("k", "o"), "CFD": ("tab:blue", "s")}
 # Depth grows downwards on paper too.
@@ -177,6 +181,29 @@ def _track(done: Validation, axis: Any) -> None:
     axis.set_aspect("equal", adjustable="datalim")
 
 
+def _checks(done: Validation, channel: str, axis: Any) -> None:
+    """The command and the check angles of a zigzag over the angle that it reverses at."""
+    command = getattr(done.case.command, _REVERSED_BY.get(channel, ""), None)
+    if command is None or command.law != "zigzag":
+        return
+    flight, along = done.simulation, done.reference.abscissa
+    name = _REVERSED_BY[channel]
+    axis.plot(flight[along], np.degrees(flight[name]), color="0.6", lw=1.0, drawstyle="steps-post")
+    for side in (-1.0, 1.0):
+        axis.axhline(side * command.check_deg, color="0.4", lw=0.8, ls=":")
+    note = f"grey: {_LABELS[name]}; dotted: check angle {command.check_deg:g} deg"
+    axis.set_title(note, fontsize=8, loc="right")
+
+
+def _deflections(done: Validation, planes: list[str], axis: Any) -> None:
+    """Every plane of the main flight."""
+    along = done.reference.abscissa
+    for plane in planes:
+        axis.plot(done.simulation[along], np.degrees(done.simulation[plane]), lw=1.0, label=in_figure(plane))
+    dress(axis, _ALONG[along], "plane deflection [deg]")
+    axis.legend(fontsize=7, framealpha=0.8, ncols=3)
+
+
 def _spiral(done: Validation, axis: Any) -> None:
     """Steady yaw rate against rudder, in the order flown."""
     curve = done.curve or []
@@ -225,12 +252,16 @@ def _draw(done: Validation, plt: Any, bands: Bands | None) -> tuple[Any, Any]:
     reference = done.case.reference
     named = reference.channels if reference and reference.channels else list(_SHOWN.get(kind, _DEFAULT))
     channels = [c for c in named if c in done.simulation.columns or c in CHANNELS]
-    rows = (len(channels) + 1) // 2
-    columns = min(2, len(channels))
+    planes = [c for c in done.simulation.columns if c not in CHANNELS and c not in _NO_PLANES]
+    panels = len(channels) + bool(planes)
+    rows, columns = (panels + 1) // 2, min(2, panels)
     figure, axes = plt.subplots(rows, columns, figsize=(11, 2.7 * rows + 0.8), layout="constrained")
     for channel, axis in zip(channels, np.ravel(axes), strict=False):
         _series(done, channel, axis, bands)
-    for axis in np.ravel(axes)[len(channels) :]:
+        _checks(done, channel, axis)
+    if planes:
+        _deflections(done, planes, np.ravel(axes)[len(channels)])
+    for axis in np.ravel(axes)[panels:]:
         axis.set_visible(False)
     return figure, np.ravel(axes)[0]
 

@@ -15,13 +15,14 @@ from ident.validation.wave_figures import exceedance_figure, harmonics_figure, s
 from sim.boat.database import version_words
 
 
-def sea_figures(done: Validation, folder: Path) -> list[Path]:
+def sea_figures(done: Validation, folder: Path, kind: str = "png") -> list[Path]:
     """Figures of a flown case in an irregular sea: histories, spectra, exceedance of broaching.
 
     Parameters
     ----------
     done : A flown case; of any other there are none.
     folder : Where to write.
+    kind : Format: png, svg or pdf.
     """
     if done.case.maneuver != "irregular_waves" or done.simulation.waves is None:
         return []
@@ -31,19 +32,20 @@ def sea_figures(done: Validation, folder: Path) -> list[Path]:
     found = done.in_waves.statistics
     met = seaway.encountered(done.simulation.waves, done.simulation, start=found["D0"].start)
     return [
-        seaway_figure(done.simulation, found, folder / f"{name}_histories.png", title, stamp, BROACHING),
-        spectrum_figure(found, met, folder / f"{name}_spectra.png", title, stamp),
-        exceedance_figure(found["D0"], folder / f"{name}_broaching.png", title, stamp, "below", BROACHING),
+        seaway_figure(done.simulation, found, folder / f"{name}_histories.{kind}", title, stamp, BROACHING),
+        spectrum_figure(found, met, folder / f"{name}_spectra.{kind}", title, stamp),
+        exceedance_figure(found["D0"], folder / f"{name}_broaching.{kind}", title, stamp, "below", BROACHING),
     ]
 
 
-def harmonics_over_depth(done: list[Validation], folder: Path) -> list[Path]:
+def harmonics_over_depth(done: list[Validation], folder: Path, kind: str = "png") -> list[Path]:
     """First harmonics over depth of the cases in a regular wave that were flown, beside the published ones.
 
     Parameters
     ----------
     done : Flown cases.
     folder : Where to write.
+    kind : Format: png, svg or pdf.
 
     Returns
     -------
@@ -57,10 +59,10 @@ def harmonics_over_depth(done: list[Validation], folder: Path) -> list[Path]:
             while any(other.case.initial.depth_m == depth for other in groups.get(key, [])):
                 key += " again"
             groups.setdefault(key, []).append(one)
-    return [_over_depth(group, folder, f"_{i + 1}" if i else "") for i, group in enumerate(groups.values())]
+    return [_over_depth(group, folder, f"_{i + 1}" if i else "", kind) for i, group in enumerate(groups.values())]
 
 
-def _over_depth(done: list[Validation], folder: Path, suffix: str) -> Path:
+def _over_depth(done: list[Validation], folder: Path, suffix: str, kind: str) -> Path:
     """The figure of one vehicle in one wave."""
     metric = {"dz1_over_aw": "dz1_over_aw", "theta1_deg": "theta1"}
     rows = [
@@ -78,5 +80,5 @@ def _over_depth(done: list[Validation], folder: Path, suffix: str) -> Path:
     # mu is 180 deg in head seas.
     title = f"{case.vehicle} in regular {wave}, mu = {math.degrees(encounter.angle):.0f} deg"
     title += f", U = {encounter.speed:.3g} m/s"
-    path = folder / f"harmonics_in_waves{suffix}_v{database['version']}.png"
+    path = folder / f"harmonics_in_waves{suffix}_v{database['version']}.{kind}"
     return harmonics_figure(flown, reference, path, title, version_words(database))
