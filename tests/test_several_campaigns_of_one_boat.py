@@ -13,9 +13,8 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from rewritten_campaigns import BB2, assert_same, header, number, text
+from rewritten_campaigns import BB2, assert_same, frame_text, header, in_units, moved, number, scaled, text, turned
 from small_campaign import HEADER
-from test_campaign_in_another_form import frame_text, in_units, moved, scaled, turned
 
 from ident.captive.campaign import find_campaigns, read_campaign
 from ident.captive.combine import by_vehicle
