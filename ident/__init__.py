@@ -9,6 +9,7 @@ Examples
 Frozen({})
 """
 
+import sys
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
@@ -101,6 +102,11 @@ __all__ = [  # noqa: RUF022  (in the order of the work)
     "InputError",
     "NoEquilibrium",
 ]
+
+
+# Known to Gymnasium where that is in use already; else ``import ident.environments``.
+if "gymnasium" in sys.modules:
+    import_module("ident.environments")
 
 
 def __getattr__(name: str) -> Any:

@@ -6,7 +6,7 @@ import math
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from sim.boat.coefficients import Coefficients
 from sim.boat.database import read_rows
@@ -38,6 +38,14 @@ def _open_loop(case: Case) -> Case:
         trim_tank=case.command.trim_tank,
     )
     return case.model_copy(update={"command": commands, "run": case.run.model_copy(update={"stop": []})})
+
+
+def _given(name: str, values: ArrayLike | None, default: Array) -> Array:
+    """A copy of values, of the default's shape."""
+    found = np.array(default if values is None else values, dtype=float)
+    if found.shape != default.shape or not np.isfinite(found).all():
+        raise InputError(f"plant, {name}", f"{np.shape(found)} {found.tolist()}", f"{default.size} finite numbers")
+    return found
 
 
 class Plant:
@@ -114,11 +122,23 @@ class Plant:
         boat = load_vehicle(vehicle) if vehicle else load_vehicle(data.vehicle, beside=where)
         return cls(data, Coefficients(boat, read_rows(str(db), version, boat.name)[0]))
 
-    def reset(self) -> None:
-        """Back to the start: time zero, initial state and controls, the commands that hold them."""
+    def reset(self, state: ArrayLike | None = None, controls: ArrayLike | None = None) -> None:
+        """Back to time zero and the commands of the start.
+
+        Parameters
+        ----------
+        state : (12,) to start from, that of the case when None; SI and radians.
+        controls : Deflections [rad], n [1/s] and tanks as they are then, likewise; commands stay those of the case.
+
+        Raises
+        ------
+        InputError
+            For another number of values, or one that is not finite.
+        """
         # Start of the present control sample, and what is left of it.
-        self._sample, self._left = 0.0, self.dt
-        self.time, self.state, self.controls = 0.0, self._start.copy(), self._moved.copy()
+        self._sample, self._left, self.time = 0.0, self.dt, 0.0
+        self.state = _given("state", state, self._start)
+        self.controls = _given("controls", controls, self._moved)
         planes = len(self.vehicle.planes)
         level = (self.trim.dV, self.trim.dH) if self.trim else (0.0, 0.0)
         self.commands = dict(zip(COMMANDS, (*level, *self.controls[planes:].tolist()), strict=False))
