@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict, dataclass, field, replace
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ident.analysis.derivatives import loads, prime_scale, slope, steps
+from ident.analysis.state_space import StateSpaceModel, state_space
 from ident.output import html_table
 from ident.text import on_screen
 from sim.boat.catalogue import OUTPUTS, STATES
@@ -29,6 +31,7 @@ from sim.kernel.layout import Model, workspace
 
 if TYPE_CHECKING:
     import pandas as pd
+    from control import StateSpace
     from rich.console import Console
 
 Array = NDArray[np.float64]
@@ -113,10 +116,29 @@ class Stability:
     horizontal: list[tuple[float, float]]
     linear: dict[str, Linear]
     about: str
+    _whole: Callable[[], StateSpaceModel] | None = field(default=None, repr=False, compare=False)
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data; eigenvalues as (real, imaginary), linear models as states, command, a, b, about."""
-        return asdict(self)
+        found = asdict(replace(self, _whole=None))
+        del found["_whole"]
+        return found
+
+    def state_space(self) -> StateSpaceModel:
+        """The boat as one linear system with all its states, actuators and inputs, about self-propulsion.
+
+        Raises
+        ------
+        InputError
+            Where there is no self-propulsion.
+        """
+        if self._whole is None:
+            raise InputError("stability, state space", "a state on its own", "one of ident.stability(...)")
+        return self._whole()
+
+    def to_ss(self) -> StateSpace:
+        """The same for python-control (extra ``control``): A, B, C, D with names."""
+        return self.state_space().to_ss()
 
 
 @dataclass(frozen=True)
@@ -153,6 +175,17 @@ class StabilityMap:
         import pandas as pd
 
         return pd.DataFrame([{k: getattr(s, k) for k in _TABLED} for s in self.states], columns=list(_TABLED))
+
+    def to_ss(self) -> StateSpace | tuple[StateSpace, ...]:
+        """``to_ss()`` of the state, or of each in their order where there are several.
+
+        Raises
+        ------
+        InputError
+            Where there is no self-propulsion.
+        """
+        found = tuple(s.to_ss() for s in self.states)
+        return found[0] if len(found) == 1 else found
 
     def to_dict(self) -> list[dict[str, Any]]:
         """``to_dict()`` of every state."""
@@ -380,7 +413,11 @@ def stability(
     depths = depths or tuple(sorted(drift["depth_m"].dropna().unique())) or (data.initial.depth_m,)
     coefficients = Coefficients(vehicle, rows)
     environment = environment_of(data)
-    found = [stability_at(coefficients, environment, u, d) for d in depths for u in speeds]
+    found = []
+    for depth in depths:
+        for speed in speeds:
+            whole = partial(state_space, coefficients, environment, speed, depth, data.run.step_s)
+            found.append(replace(stability_at(coefficients, environment, speed, depth), _whole=whole))
     return StabilityMap(vehicle.title, number, tuple(found))
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ident.commands.shared import DB, MESSAGE, OUT, VERSION, WAIT, console_for, emit, equilibrium_of, json_to
+from ident.commands.shared import DB, MESSAGE, OUT, VERSION, WAIT, console_for, emit, equilibrium_of, json_to, out_file
 from ident.text import in_file_name, on_screen, visible
 
 if TYPE_CHECKING:
@@ -235,6 +235,7 @@ def calibrate(
 @click.option("--case", "case", default="hzz20", show_default=True, help="Case that gives vehicle and environment.")
 @click.option("--speed", "speeds", type=click.FloatRange(0, 100, min_open=True), multiple=True, help="U [m/s]; repeat.")
 @click.option("--depth", "depths", type=click.FloatRange(0, 11000), multiple=True, help="D0 [m]; repeat.")
+@out_file("Figure to draw, .png, .svg or .pdf: root loci and Bode plots over speed and depth.")
 @json_to("Write the results as JSON.")
 def stability(
     db: str,
@@ -242,6 +243,7 @@ def stability(
     case: str,
     speeds: tuple[float, ...],
     depths: tuple[float, ...],
+    out: Path | None,
     json_path: str | None,
 ) -> None:
     """Stability indices, eigenvalues and critical speeds against speed and depth.
@@ -250,6 +252,7 @@ def stability(
 
     \b
     Example: ident stability --speed 3 --speed 5 --depth 25
+             ident stability --out roots.svg
     """
     import ident
     from ident.analysis.stability import show
@@ -261,5 +264,9 @@ def stability(
     with console.status("linearising"):
         found = ident.stability(case, db, version, speeds, depths)
     show(found, console)
+    if out:
+        from ident.analysis.figures import stability_figure
+
+        console.print(f"figure: {on_screen(stability_figure(found, out))}", highlight=False)
     if json_path:
         emit(found.to_dict(), json_path)

@@ -103,7 +103,8 @@ class BoatEnv(gymnasium.Env[Array, Array]):
         boat = self.plant.vehicle
         self.task = TASKS[task](goal_of(boat, numbers), self.plant.state.copy(), 1)
         self.observed = self.task.observed
-        self.action_space = action_space(boat)
+        self.action_space: spaces.Space[Any] = action_space(boat)
+        self._box = action_space(boat)
         self.observation_space = spaces.Box(-np.inf, np.inf, (len(self.observed),), np.float64)
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Array, dict[str, Any]]:
@@ -118,8 +119,7 @@ class BoatEnv(gymnasium.Env[Array, Array]):
 
     def step(self, action: Array) -> tuple[Array, float, bool, bool, dict[str, Any]]:
         """Command dV and dH for a period."""
-        box = self.action_space
-        assert isinstance(box, spaces.Box)
+        box = self._box
         given = np.clip(np.asarray(action, dtype=float), box.low, box.high)
         try:
             self.plant.step(self._steps, dV=given[0], dH=given[1])

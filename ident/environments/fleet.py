@@ -18,7 +18,7 @@ from sim.flight.fleet import FleetPlant
 Array = NDArray[np.float64]
 
 
-class FleetEnv(VectorEnv[Array, Array, Array]):
+class FleetEnv(VectorEnv[Array, Array, Any]):
     """``BoatEnv`` many times, over the compiled loop and all cores; parameters as there.
 
     A boat that is done starts anew with the next step, whose reward is zero (``AutoresetMode.NEXT_STEP``).
@@ -52,7 +52,7 @@ class FleetEnv(VectorEnv[Array, Array, Array]):
         self._duration, self._spread = duration or data.run.duration_s, spread
         boat = self.plant.vehicle
         self.task = TASKS[task](goal_of(boat, numbers), self.plant.start, num_envs)
-        self.single_action_space = action_space(boat)
+        self.single_action_space = self._box = action_space(boat)
         shape = (len(self.task.observed),)
         self.single_observation_space = spaces.Box(-np.inf, np.inf, shape, np.float64)
         self.action_space = batch_space(self.single_action_space, num_envs)
@@ -75,7 +75,7 @@ class FleetEnv(VectorEnv[Array, Array, Array]):
 
     def step(self, actions: Array) -> tuple[Array, Array, Array, Array, dict[str, Any]]:
         """Command dV and dH of every boat for a period."""
-        box = self.single_action_space
+        box = self._box
         again = self._over.copy()
         given = np.clip(np.asarray(actions, dtype=float), box.low, box.high)
         self.plant.commands[:, :2] = given
