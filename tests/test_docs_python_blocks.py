@@ -71,3 +71,11 @@ def test_the_right_hand_side_of_the_page_stays_at_its_equilibrium(desk):
     flown, trim = names["flown"], names["trim"]
     assert flown.success
     np.testing.assert_allclose(flown.y[:6, -1], trim.state[:6], atol=1e-3)
+
+
+def test_the_boat_in_other_tools_runs_as_the_page_has_it(desk):
+    names: dict[str, object] = {}
+    for block in _blocks("docs/other-tools.md"):
+        exec(compile(block, "docs/other-tools.md", "exec"), names)
+    assert names["observation"].shape == (10,)
+    assert names["phase_margin"] > 60.0

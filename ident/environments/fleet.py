@@ -73,7 +73,7 @@ class FleetEnv(VectorEnv[Array, Array, Any]):
         self.task.reset(which)
         self._time[which], self._over[which] = 0.0, False
 
-    def step(self, actions: Array) -> tuple[Array, Array, Array, Array, dict[str, Any]]:
+    def step(self, actions: Array) -> tuple[Array, Any, Any, Any, dict[str, Any]]:
         """Command dV and dH of every boat for a period."""
         box = self._box
         again = self._over.copy()
