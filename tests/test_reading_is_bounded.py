@@ -1,16 +1,18 @@
 """Authority: memory and time of a reader are bounded by the size of what a file means, not by what it unfolds to.
 
 Parquet files that unfold a thousandfold, pipes that nobody writes to, links that lead round in circles
-or out of the campaign's folder.
+or out of the campaign's folder, regular expressions that fit a line in more ways than there are seconds.
 """
 
 from __future__ import annotations
 
+import contextlib
 import os
 import resource
 import shutil
 import subprocess
 import sys
+import time
 
 import numpy as np
 import pyarrow as pa
@@ -96,3 +98,45 @@ def test_a_glob_that_is_none_is_one_message(tmp_path):
         folder = write(tmp_path / f"campaign{k}", header=HEADER + f'[[source]]\nfiles = "{pattern}"\n')
         with pytest.raises(InputError):
             read_campaign(folder)
+
+
+SLOW = "(a+)+$"
+KEYS = {
+    "skip": f'[[source]]\nfiles = "drift.csv"\nskip = "{SLOW}"\n',
+    "header_pattern": f'[[source]]\nfiles = "drift.csv"\ndelimiter = ","\nheader_pattern = "^run_id|{SLOW}"\n',
+    "patterns": f'[[source]]\nfiles = "drift.csv"\n[source.patterns]\n"{SLOW}" = "X"\n',
+    "match": '[[source]]\nfiles = "*.csv"\nmatch = "(a+)+(?P<beta_deg>[0-9])$"\n',
+}
+
+
+@pytest.mark.parametrize("key", list(KEYS))
+def test_an_expression_is_matched_in_linear_time(tmp_path, key):
+    """Fifty letters are fitted in 2^50 ways by the engine of Python."""
+    folder = write(tmp_path / "campaign", header=HEADER + KEYS[key])
+    drift = folder / "drift.csv"
+    if key == "match":
+        drift.rename(folder / f"{'a' * 50}!.csv")
+    elif key == "patterns":
+        drift.write_text(drift.read_text().replace("run_id,", f"run_id,{'a' * 50}!,").replace("\nh", "\nh0,0,h"))
+    else:
+        drift.write_text(f"{'a' * 50}!\n" + drift.read_text())
+    begun = time.monotonic()
+    with contextlib.suppress(InputError):
+        read_campaign(folder)
+    assert time.monotonic() - begun < 10.0
+
+
+@pytest.mark.parametrize(
+    ("pattern", "words"),
+    [
+        ("beta(?=_)", "no look-around"),
+        (r"(\\d)\\1", "no back-references"),
+        ("[", "regular expression"),
+        ("(a{500}b{500}){100}", "regular expression"),
+        (r"[\\pL\\d]{200}", "a smaller regular expression"),
+        ("a" * 2000, "1000 characters at most"),
+    ],
+)
+def test_an_expression_of_another_syntax_or_size_is_refused_with_its_key(tmp_path, pattern, words):
+    folder = write(tmp_path / "campaign", header=HEADER + f'[[source]]\nfiles = "*.csv"\nskip = "{pattern}"\n')
+    assert_refused(folder, "source.0.skip", words)

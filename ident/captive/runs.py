@@ -17,6 +17,7 @@ from ident.captive.campaign_file import CampaignFile
 from ident.captive.conversions import dimensional, quantity_of
 from ident.captive.histories import Channels, Moving, NotRising, Pieces, Reduced, reduce, states
 from ident.captive.moving import axes_of, moving_body, refuse_tables
+from ident.captive.patterns import search
 from ident.captive.quantities import Column, column, owner, suffixed
 from ident.captive.readers import openfoam
 from ident.captive.readers.opening import matching, open_sheet, reader_of
@@ -174,11 +175,11 @@ def constants(folder: Path, path: Path, source: Source) -> tuple[dict[str, str],
     given: dict[str, Any] = dict(source.constants)
     if source.match:
         name = path.relative_to(folder).as_posix()
-        found = re.search(source.match, name)
+        found = search(source.match, name)
         if not found:
             raise InputError(f"{folder / 'campaign.toml'}, key source.match", f"{name!r} does not match", source.match)
         named = {k: v for k, v in found.groupdict().items() if v is not None}
-        given |= {k: _of_name(k, v, name[: found.start(k)], toml) for k, v in named.items()}
+        given |= {k: _of_name(k, v, name[: found.start(found.re.groupindex[k])], toml) for k, v in named.items()}
     words: dict[str, str] = {}
     numbers: dict[str, float] = {}
     primed: set[str] = set()

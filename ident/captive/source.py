@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import re
 from typing import Annotated, Literal, get_args
 
 from pydantic import Field, field_validator, model_validator
 
+from ident.captive.patterns import compiled
 from sim.files.schema import Data
 
 Reader = Literal[
@@ -224,14 +224,14 @@ class Source(Data):
     @field_validator("match", "header_pattern", "skip")
     @classmethod
     def _pattern_compiles(cls, text: str) -> str:
-        _compiled(text)
+        compiled(text)
         return text
 
     @field_validator("patterns")
     @classmethod
     def _patterns_compile(cls, patterns: dict[str, str]) -> dict[str, str]:
         for text in patterns:
-            _compiled(text)
+            compiled(text)
         return patterns
 
     @field_validator("within")
@@ -280,10 +280,3 @@ def idle_keys(source: Source, reader: str) -> list[str]:
     some = {key for keys in LOOKED_AT.values() for key in keys}
     own = {*LOOKED_AT[reader], *(("subtract",) if reader == "openfoam" else ())}
     return sorted(k for k in source.model_fields_set if k in some and k not in own)
-
-
-def _compiled(text: str) -> None:
-    try:
-        re.compile(text)
-    except (re.error, RecursionError, OverflowError) as error:
-        raise ValueError(f"a regular expression: {error}") from error

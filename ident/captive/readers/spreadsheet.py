@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import datetime
-import re
 from pathlib import Path
 from typing import Any
 
+from ident.captive.patterns import search
 from ident.captive.readers.arrays import array_sheet, chosen, needs
 from ident.captive.readers.table import Sheet
 from ident.captive.source import Source
@@ -50,8 +50,7 @@ def _sheet(path: Path, name: str, rows: list[list[Any]], source: Source) -> Shee
     numbered = [(i, row) for i, row in enumerate(rows, start=1) if _filled(row)]
     at = 0
     if source.header_pattern:
-        pattern = re.compile(source.header_pattern)
-        at = next((k for k, (_, row) in enumerate(numbered) if pattern.search(_joined(row))), -1)
+        at = next((k for k, (_, row) in enumerate(numbered) if search(source.header_pattern, _joined(row))), -1)
         if at < 0:
             raise InputError(where, "no row fits header_pattern", repr(source.header_pattern))
     top, names = numbered[at][0], [_text(cell) for cell in numbered[at][1]]
@@ -63,8 +62,7 @@ def _sheet(path: Path, name: str, rows: list[list[Any]], source: Source) -> Shee
         names = [f"{n} [{u}]" if u else n for n, u in zip(names, units, strict=False)]
         body = body[1:]
     if source.skip:
-        leave = re.compile(source.skip)
-        body = [(i, row) for i, row in body if not leave.search(_joined(row))]
+        body = [(i, row) for i, row in body if not search(source.skip, _joined(row))]
     kept = [k for k, n in enumerate(names) if n]
     lost = [k for k, n in enumerate(names) if not n and any(len(r) > k and r[k] not in (None, "") for _, r in body)]
     if lost:

@@ -17,6 +17,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from ident.captive.patterns import search
 from ident.captive.quantities import Column, column, owner, split
 from ident.captive.readers.text import COMMENTS, Dialect, Lines, blocks, decimal_mark, head, numbers, sniff
 from ident.captive.readers.times import Clocks
@@ -233,8 +234,7 @@ def _below_title(path: Path, source: Source) -> tuple[Lines, str]:
 
 def _pattern_row(path: Path, first: Lines, source: Source) -> int:
     """Which of the first lines fits ``header_pattern``."""
-    pattern = re.compile(source.header_pattern)
-    at = next((i for i, line in enumerate(first.text) if pattern.search(line)), -1)
+    at = next((i for i, line in enumerate(first.text) if search(source.header_pattern, line)), -1)
     if at < 0:
         raise InputError(str(path), "no line in the first 200 fits header_pattern", repr(source.header_pattern))
     return at
@@ -384,7 +384,7 @@ def _by_pattern(sheet: Sheet, source: Source) -> dict[str, str]:
         raise InputError(sheet.where, "monitors without names", text)
     found: dict[str, str] = {}
     for pattern, quantity in source.patterns.items():
-        fits = [h for h in sheet.header if re.search(pattern, h)]
+        fits = [h for h in sheet.header if search(pattern, h)]
         if len(fits) != 1 or fits[0] in found:
             shown = ", ".join(repr(h[:60]) for h in (fits or sheet.header)[:8])
             number = "no column fits" if not fits else "more than one fit"

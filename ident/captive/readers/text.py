@@ -17,6 +17,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from ident.captive.patterns import compiled
 from ident.captive.readers.times import FORMS, Clocks
 from ident.captive.source import Encoding
 from sim.files.errors import InputError
@@ -151,7 +152,7 @@ def blocks(
         For a file that cannot be read, is not text, or has a line without end.
     """
     row, rest, ended = 1, "", True
-    leave = re.compile(skip).search if skip else None
+    leave = compiled(skip).search if skip else None
     for text in itertools.chain(_decoded(path, encoding), [None]):
         if text is not None:
             # A lone carriage return at the end may be half of a line end.
