@@ -23,6 +23,7 @@ from ident.checks import axes as checks_axes
 from ident.checks import copies as checks_copies
 from ident.checks import histories as checks_histories
 from ident.checks import physics as checks_physics
+from ident.checks import possible as checks_possible
 from ident.checks import runs as checks_runs
 from ident.checks import tables as checks_tables
 from ident.checks.findings import SEVERITIES, Body, Evidence, Finding, registered, rules
@@ -37,7 +38,7 @@ if TYPE_CHECKING:
     from rich.table import Table
 
 # Importing a module enters its checks in the registry.
-_MODULES = (checks_axes, checks_copies, checks_histories, checks_physics, checks_runs, checks_tables)
+_MODULES = (checks_axes, checks_copies, checks_histories, checks_physics, checks_possible, checks_runs, checks_tables)
 _COLOURS = {"error": "red", "warning": "yellow", "info": "cyan"}
 
 
@@ -72,6 +73,7 @@ def evidence_of(campaign: Campaign, folder: Path | None = None) -> Evidence:
         configurations=beside.get("configurations"),
         reference=beside.get("reference"),
         tested_length=scale.ratio * scale.length_m,
+        folder=folder,
     )
 
 

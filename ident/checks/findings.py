@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from functools import cache
 from importlib.resources import files
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -161,6 +162,7 @@ class Evidence:
     histories : Reduced time histories, with their clocks and verdicts.
     tested_length : Length of the body the loads were measured on, at the body's scale [m].
     between : Error between facilities of each load (``ident.identification.facilities.Between``).
+    folder : Where the campaign lies.
     memo : What two checks share, by name.
     """
 
@@ -176,6 +178,7 @@ class Evidence:
     histories: tuple[Reduced, ...] = ()
     tested_length: float | None = None
     between: Sequence[Any] = ()
+    folder: Path | None = None
     memo: dict[str, pd.DataFrame] = field(default_factory=dict, repr=False)
 
 

@@ -210,16 +210,26 @@ def loads_a_boat_needs(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
             reason = declared.pop(f"{test}.{output}", None)
             if runs.empty or output not in wanted:
                 continue
-            bare = not kept(runs, output).any()
-            if bare and reason is None:
-                what = f"none of {len(runs)} {test} runs gives {output}: the boat would have no {output} from it"
+            given = kept(runs, output)
+            bare = not given.any()
+            # An empty channel reads zero.
+            idle = not bare and not (runs[output][given] != 0.0).any() and _unsymmetric(runs[given], output)
+            if (bare or idle) and reason is None:
+                gives = f"gives {output}" if bare else f"gives a {output} that is not zero"
+                what = f"none of {len(runs)} {test} runs {gives}: the boat would have no {output} from it"
                 yield rule.finding(str(runs["file"].iloc[0]), [], [output], what)
-            if not bare and reason is not None:
+            if not (bare or idle) and reason is not None:
                 what = f"{test}.{output} is declared absent, and {int(kept(runs, output).sum())} runs give it"
                 yield rule.finding("campaign.toml", [], ["absent"], what)
     for name in declared:
         known = ", ".join(f"{t}.{o}" for t, loads in tests()["essential"].items() for o in str(loads).split())
         yield rule.finding("campaign.toml", [], ["absent"], f"{name!r} is declared absent; known are {known}")
+
+
+def _unsymmetric(runs: pd.DataFrame, output: str) -> bool:
+    """Whether runs include a state in which a load may not vanish by symmetry: a flow angle in its plane."""
+    angle = {"Y": "beta", "N": "beta", "Z": "alpha", "M": "alpha"}.get(output)
+    return angle is None or bool((runs[angle].fillna(0.0) != 0.0).any())
 
 
 @check("missing")

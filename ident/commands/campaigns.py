@@ -19,6 +19,8 @@ from ident.text import on_screen
 @click.option(
     "--force", default="", metavar="REASON", help="Fit in spite of errors of ident check; the reason is stored."
 )
+# What it did is done without it since errors stop a fit; scripts that state it go on.
+@click.option("--strict", is_flag=True, hidden=True, expose_value=False)
 @WAIT
 @click.option("--measured-only", is_flag=True, help="What the runs give, without any estimate.")
 @click.option("--without", multiple=True, metavar="ESTIMATE", help="Leave a named estimate out; may be repeated.")

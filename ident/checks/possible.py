@@ -1,0 +1,145 @@
+"""Checks of what can be at all: states of a boat in water, errors that leave something known, loads that act."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Iterator
+from itertools import islice
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from ident.captive.campaign import Campaign
+from ident.captive.run_table import MEASURED
+from ident.checks.findings import Evidence, Finding, Rule, check, kept, rows_of, together
+from sim.boat.catalogue import ACCELERATIONS
+
+# Files that hold runs when a campaign's source names them.
+_TABLES = frozenset((".csv", ".parquet", ".xlsx", ".xls", ".xlsb", ".ods", ".mat", ".h5", ".nc", ".tdms", ".lvm"))
+# Files that one finding looks at: a folder may hold a whole archive beside the runs.
+_MOST = 2000
+
+
+@check("state")
+def states_of_a_boat(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
+    """Speeds, angles, depths and motions that no boat has."""
+    runs, limits = evidence.runs, rule.limits
+    length = evidence.body.length if evidence.body else math.nan
+    angles = {"alpha": limits["incidence"], "beta": limits["drift"], "plane": limits["plane"]}
+    for name, most in angles.items():
+        size = np.degrees(runs[name]).abs()
+        yield from _beyond(runs, rule, name, size, most, "deg")
+    yield from _beyond(runs, rule, "U", runs["U"], limits["speed"], "m/s at full scale")
+    for name in ("p", "q", "r"):
+        yield from _beyond(runs, rule, name, runs[name].abs() * length, limits["speed"], "m/s at the boat's length")
+    for name in ACCELERATIONS:
+        lever = 1.0 if name in ("udot", "vdot", "wdot") else length
+        yield from _beyond(runs, rule, name, runs[name].abs() * lever, limits["acceleration"], "m/s^2")
+    vehicle = evidence.vehicle
+    if vehicle is not None and vehicle.propeller is not None:
+        tip = math.pi * vehicle.diameter * runs["n"].abs()
+        yield from _beyond(runs, rule, "n", tip, limits["tip"], "m/s at the tip of the propeller's blades")
+    yield from _beyond(runs, rule, "D0", runs["D0"], limits["depth"], "m of depth")
+
+
+def _beyond(runs: pd.DataFrame, rule: Rule, name: str, size: pd.Series, most: float, unit: str) -> Iterator[Finding]:
+    for file, group in runs[size > most].groupby(together(runs), sort=False):
+        worst = size[group.index].idxmax()
+        what = f"{name} of run {runs.loc[worst, 'run_id']} is {size[worst]:.4g} {unit}, beyond {most:g}"
+        yield rule.finding(str(file), rows_of(group), [name], f"{what}; {len(group)} of the runs")
+
+
+@check("state")
+def boats_in_the_air(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
+    """Depths above the surface: D0 is positive down."""
+    runs, vehicle = evidence.runs, evidence.vehicle
+    above = runs[runs["D0"] < 0.0]
+    if above.empty:
+        return
+    # The keel is about as far below the centre of buoyancy as the sail top is above it.
+    whole = math.inf
+    if vehicle is not None and vehicle.particulars.sail_top is not None:
+        particulars = vehicle.particulars
+        whole = 2.0 * abs(particulars.sail_top.value[2] - particulars.centre_of_buoyancy.value[2])
+    for file, group in above.groupby(together(runs), sort=False):
+        out = float(-group["D0"].min())
+        what = f"D0 = {-out:.4g} m has the sail top {out:.4g} m above the surface"
+        what += ", and the whole boat out of the water" if out > whole else ""
+        severity = rule.severity if out > whole else "warning"
+        yield rule.finding(str(file), rows_of(group), ["D0"], f"{what}: D0 is positive down", severity)
+
+
+@check("errors")
+def errors_that_leave_nothing(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
+    """Relative errors of more than all of a load: per cent for a fraction."""
+    runs = evidence.runs
+    published = runs["coefficient"].fillna("").ne("") if "coefficient" in runs else pd.Series(False, runs.index)
+    for are, most in ((~published, rule.limits["run"]), (published, rule.limits["published"])):
+        large = runs[are & (runs["rel_sigma"] > most)]
+        for file, group in large.groupby(together(runs), sort=False):
+            worst = group["rel_sigma"].idxmax()
+            what = f"rel_sigma = {group['rel_sigma'][worst]:.4g} of run {group['run_id'][worst]} is "
+            what += f"{100.0 * group['rel_sigma'][worst]:.4g} % of the load; {len(group)} of the runs above {most:g}"
+            yield rule.finding(str(file), rows_of(group), ["rel_sigma"], what)
+
+
+@check("errors")
+def loads_without_error(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
+    """Loads with a standard error of zero are known exactly: all others would count for nothing beside them."""
+    runs = evidence.runs
+    for file, group in runs.groupby(together(runs), sort=False):
+        exact = {o: kept(group, o) & (group[o] != 0.0) & (group[f"s_{o}"] == 0.0) for o in MEASURED if o in group}
+        columns = [o for o, bad in exact.items() if bad.any()]
+        if columns:
+            bad = group[pd.DataFrame(exact).any(axis=1)]
+            what = f"{' '.join(columns)} of run {bad['run_id'].iloc[0]} with a standard error of zero; {len(bad)} runs"
+            yield rule.finding(str(file), rows_of(bad), columns, what)
+
+
+@check("zero")
+def loads_that_do_not_act(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
+    """Runs of one test and part whose every load is zero."""
+    runs = evidence.runs
+    names = [o for o in MEASURED if o in runs]
+    given = pd.DataFrame({o: kept(runs, o) for o in names})
+    acts = given & (runs[names] != 0.0)
+    for (_, test, part), group in runs.groupby([together(runs), "test", "part"], sort=False):
+        if given.loc[group.index].any(axis=None) and not acts.loc[group.index].any(axis=None):
+            columns = [o for o in names if given.loc[group.index, o].any()]
+            what = f"every load of {len(group)} {test} runs of {part or 'the boat'} is zero"
+            yield rule.finding(str(group["file"].iloc[0]), rows_of(group), columns, what)
+
+
+@check("unread")
+def files_that_nothing_reads(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
+    """Tables in the folder of a campaign that no source names."""
+    campaign, folder = evidence.campaign, evidence.folder
+    if campaign is None or folder is None:
+        return
+    left = _unread(campaign, folder)
+    if left:
+        more = f" and {len(left) - 5} more" if len(left) > 5 else ""
+        what = f"{', '.join(left[:5])}{more}: in the campaign's folder, and no source reads it"
+        yield rule.finding(left[0], [], [], what)
+
+
+def _unread(campaign: Campaign, folder: Path) -> list[str]:
+    """Names of the tables below a folder that are no input of the campaign, nor of one below it."""
+    known = {*campaign.digests, *campaign.header.tables.given().values()}
+    vehicle = campaign.vehicle
+    beside = {Path(p).resolve() for p in (vehicle.terms, vehicle.errata, vehicle.geometry) if p}
+    found = []
+    for root, folders, names in islice(os.walk(folder), _MOST):
+        if Path(root) != folder and "campaign.toml" in names:
+            folders.clear()
+            continue
+        folders[:] = sorted(f for f in folders if not f.startswith("."))
+        for name in sorted(names)[:_MOST]:
+            path = Path(root) / name
+            if name.startswith(".") or path.suffix.lower() not in _TABLES or path.resolve() in beside:
+                continue
+            if path.relative_to(folder).as_posix() not in known:
+                found.append(path.relative_to(folder).as_posix())
+    return found
