@@ -60,7 +60,9 @@ def test_every_channel_of_the_simulation_is_compared(tmp_path, fitted_db):
     path = tmp_path / "mine.csv"
     pd.DataFrame(rows, columns=["source", "channel", "t", "value", "unit"]).to_csv(path, index=False)
     assert validate("vzz10-15kt", fitted_db).to_dict()["references"] == {}
-    found = validate("vzz10-15kt", fitted_db, reference=path).to_dict()["references"]
+    done = validate("vzz10-15kt", fitted_db, reference=path).to_dict()
+    found = done["references"]
+    assert "reference TANK: channel 'mood' is none of a simulation's and is not compared" in done["notes"]
     assert set(found) == {"TANK"}
     assert set(found["TANK"]) == {"theta", "q"}
     # 0.01 t against 0.02 t: root mean square of 0.01 t.
@@ -84,7 +86,7 @@ def test_command_line_takes_an_own_reference(tmp_path, fitted_db):
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("source,channel,t,value\nA,x,0,1\n", ["mine.csv", "two rows or more"]),
+        ("source,channel,t,value\nA,x,0,1\n", ["mine.csv", "column unit missing"]),
         ("source,channel,t,value,unit\nA,mood,0,1,m\n", ["column channel", "mood"]),
         ("source,channel,t,value,unit\nA,x,0,1,m\nA,x,0,2,m\n", ["not increasing"]),
         ("source,channel,t,value,unit\nA,x,0,1,m\nA,x,1,2,ft\n", ["units", "ft"]),
@@ -92,11 +94,19 @@ def test_command_line_takes_an_own_reference(tmp_path, fitted_db):
         ("source,channel,t,value,unit\nA,x,0,one,m\n", ["row 2", "value", "one"]),
         ("source,channel,t,value,unit,sigma\nA,x,0,1,m,?\n", ["row 2", "sigma"]),
         ("source,channel,t,value,unit\nA,x,900,1,m\n", ["begins", "900"]),
-        ("", ["mine.csv", "no rows"]),
+        (
+            "source,channel,t,value,unit\nA,x,0,1,m\nA,x,1e9,1,m\n",
+            ["A x", "one of 2 points", "1e+09", "run, which ends"],
+        ),
+        ("source,channel,t,value,unit\nA,x,0,1,m\n", ["A x", "one point", "two points or more"]),
+        ("source,channel,t,value,unit,Sigma\nA,x,0,1,m,1\n", ["column Sigma", "sigma?"]),
+        ("source,channel,t,value,unit\nA,Theta,0,1,rad\nA,x,0,1,m\n", ["column channel", "'Theta' of A", "theta?"]),
+        ("source;channel;t;value;unit\nA;x;0;1;m\n", ["mine.csv", "without commas"]),
+        ("", ["mine.csv", "not a table"]),
         ("source,channel,t,value,unit\nA,x,0,1,m\n,x,1,2,m\n", ["row 3", "column source", "nothing"]),
         ("source,channel,t,value,unit\nA,x,-2,1,m\nA,x,1,2,m\n", ["row 2", "column t", "-2", "zero or more"]),
         ("source,channel,t,value,unit,sigma\nA,x,0,1,m,-1\n", ["row 2", "column sigma", "-1", "zero or more"]),
-        ("\xff\xfe", ["mine.csv", "no rows"]),
+        ("\xff\xfe", ["mine.csv", "not a table"]),
     ],
 )
 def test_mistake_in_an_own_reference_is_named(tmp_path, fitted_db, text, words):
@@ -106,6 +116,18 @@ def test_mistake_in_an_own_reference_is_named(tmp_path, fitted_db, text, words):
         validate("vzz10-15kt", fitted_db, reference=path)
     for word in words:
         assert word in str(caught.value)
+
+
+def test_points_beyond_the_run_and_units_of_time_are_said(tmp_path, fitted_db):
+    """vzz10-15kt: half of the points lie beyond the run; minutes for seconds end in its first twentieth."""
+    end = load_case("vzz10-15kt")[0].run.duration_s
+    t = np.linspace(0.0, 2.0 * end, 41)
+    path = tmp_path / "mine.csv"
+    for times, words in ((t, ["points of theta lie beyond", "not compared"]), (t / 120.0, ["is t in s?"])):
+        rows = [("TANK", "theta", x, 0.0, "rad") for x in times]
+        pd.DataFrame(rows, columns=["source", "channel", "t", "value", "unit"]).to_csv(path, index=False)
+        (note,) = validate("vzz10-15kt", fitted_db, reference=path).notes
+        assert all(word in note for word in words), note
 
 
 def test_missing_own_reference_is_named(tmp_path, fitted_db):

@@ -78,7 +78,9 @@ def test_mistake_in_a_case_is_named(write, fitted_db, old, new, words):
     ("old", "new", "words"),
     [
         ("rad", "furlong", ["furlong", "rad"]),
-        ("value", "valu", ["roll_decay.csv"]),
+        ("value", "valu", ["roll_decay.csv", "column value missing", "'valu'"]),
+        ("sigma", "Sigma", ["roll_decay.csv", "column Sigma", "sigma?"]),
+        ("EXP,phi,", "EXP,Phi,", ["column channel", "'Phi' of EXP", "phi?"]),
         ("-0.076853", "nan", ["row", "column value", "nan"]),
         ("EXP,phi,", ",phi,", ["row 2", "column source", "nothing"]),
     ],

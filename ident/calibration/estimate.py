@@ -25,8 +25,8 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares, minimize_scalar
 
 from ident.calibration.file import CalibrationFile, Parameter, Training, apply
+from ident.validation.references import check_reference
 from ident.validation.trial_reference import TRIAL, Referenced, referenced
-from ident.validation.validate import check_reference
 from sim.boat.coefficients import Coefficients
 from sim.boat.mass import Environment
 from sim.boat.vehicle import Vehicle, load_vehicle

@@ -25,6 +25,8 @@ from sim.files.record import Record
 Array = NDArray[np.float64]
 _MOST_ROWS = 2_000_000
 _LONG = ("channel", "value", "unit")
+# Characters by which a line is found again.
+_EXACTLY = 200
 # A header stands within the first lines.
 _TITLES = 100
 _TIMES = ("t", "time", "time s", "t s")
@@ -97,7 +99,8 @@ def _names(line: str, mark: str | None) -> int:
 
 
 def _exactly(line: str) -> str:
-    return "^" + re.escape(line) + "$"
+    """An expression for one line, by its first characters where it is a long one."""
+    return "^" + re.escape(line[:_EXACTLY]) + ("$" if len(line) <= _EXACTLY else "")
 
 
 def _cells(sheet: Sheet) -> tuple[list[int], list[list[str]]]:

@@ -5,8 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field, field_validator, model_validator
 
+from ident.captive.patterns import compiled
 from ident.captive.source import Encoding
 from sim.boat.vehicle import read_toml
 from sim.files.schema import Data, FrameData, checked
@@ -97,6 +98,12 @@ class TrialFile(Data):
     header_pattern: str = ""
     skip: str = ""
     units_row: bool = False
+
+    @field_validator("header_pattern", "skip")
+    @classmethod
+    def _pattern_compiles(cls, text: str) -> str:
+        compiled(text)
+        return text
 
 
 def load_spec(path: Path | None) -> TrialFile:

@@ -25,13 +25,13 @@ from sim.files.record import Record, Written
 from sim.files.schema import FrameData
 from sim.flight.case import Case, Reference, Series, Start, load_reference
 from sim.flight.commands import Event, PlaneCommand, PlaneStep, SpeedCommand, SpeedStep
+from sim.flight.reference_table import is_series
 from sim.flight.simulate import CHANNELS
 
 Array = NDArray[np.float64]
 _PROGRAM = FrameData(x="forward", y="starboard", z="down")
 TRIAL = "TRIAL"
 DRIVEN = f"{TRIAL} with recorded controls"
-_LONG = {"source", "channel", "value", "unit"}
 _GRID = 2000
 # Rudder angles nearer than this [rad] are one step of a programme.
 _ALIKE = math.radians(0.05)
@@ -57,13 +57,6 @@ class Referenced:
     driven: Case | None = None
     notes: list[str] = field(default_factory=list)
     sigma: dict[str, dict[str, float]] = field(default_factory=dict)
-
-
-def is_long(path: Path) -> bool:
-    """Whether a file is a table of source, channel, t or s, value, unit, as bundled references are."""
-    with path.open("rb") as stream:
-        first = stream.readline().decode("utf-8", errors="replace")
-    return set(first.strip().lstrip("\ufeff").split(",")) >= _LONG
 
 
 def referenced(case: Case, where: str) -> Referenced:
@@ -92,7 +85,7 @@ def referenced(case: Case, where: str) -> Referenced:
 
 
 def _long_or_missing(path: Path) -> bool:
-    return not path.is_file() or is_long(path)
+    return not path.is_file() or is_series(path)
 
 
 def with_trial(case: Case, path: Path, spec: TrialFile, recorded: bool) -> Referenced:

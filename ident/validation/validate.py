@@ -16,15 +16,17 @@ from ident.trials.spec import load_spec
 from ident.validation.boats import Boat, Fleet
 from ident.validation.coverage import outside_tables
 from ident.validation.other_boat import Asked, check_answers, for_boat, saturated
+from ident.validation.references import beyond_the_run, check_reference, compared
 from ident.validation.result import ChannelError, Validation
 from ident.validation.sweep import with_grid
-from ident.validation.trial_reference import DRIVEN, TRIAL, Referenced, is_long, referenced, smoothed, with_trial
+from ident.validation.trial_reference import DRIVEN, TRIAL, Referenced, referenced, smoothed, with_trial
 from sim.boat.database import axis_columns, version_words
 from sim.boat.vehicle import load_vehicle
 from sim.files.errors import InputError
 from sim.files.record import Record
 from sim.files.schema import FrameData
 from sim.flight.case import Case, Reference, Series, load_case, read_series
+from sim.flight.reference_table import is_series
 from sim.flight.simulate import CHANNELS, Simulation, fly
 
 if TYPE_CHECKING:
@@ -45,31 +47,6 @@ def rmse(simulation: Simulation, channel: str, record: Record, abscissa: str = "
     return float(np.sqrt(np.mean((np.interp(record.abscissa, simulation[abscissa], flown) - value) ** 2)))
 
 
-def check_reference(case: Case, reference: Series, where: str) -> None:
-    """Refuse sources, channels and units that cannot be compared.
-
-    Raises
-    ------
-    InputError
-        Naming the case file, what was found and what is allowed.
-    """
-    if case.reference is None or not reference.data:
-        return
-    named = {*case.reference.compare, *([case.reference.published_model] if case.reference.published_model else [])}
-    for source in sorted(named - set(reference.data)):
-        raise InputError(f"{where}, key reference", f"source {source!r}", f"one of {', '.join(reference.data)}")
-    for channel in case.reference.channels:
-        if channel not in CHANNELS:
-            raise InputError(f"{where}, key reference.channels", repr(channel), ", ".join(CHANNELS))
-        allowed = {CHANNELS[channel], CHANNELS[channel].replace("rad", "deg")}
-        units = {reference[source][channel].shown.unit for source in named if channel in reference[source]}
-        if not units:
-            raise InputError(f"{where}, key reference.channels", repr(channel), "a channel of the reference file")
-        for unit in sorted(units - allowed):
-            text = f"{channel} in {unit!r}"
-            raise InputError(case.reference.file or where, text, " or ".join(sorted(allowed)))
-
-
 def _published(published: dict[str, Record], channel: str, unit: str) -> tuple[Array, Array]:
     """Abscissa and value of the published model in the reference's unit."""
     return published[channel].abscissa, published[channel].in_unit(unit).value
@@ -83,14 +60,11 @@ def _error(
     Raises
     ------
     InputError
-        When the reference begins after the run ends.
+        As ``compared``.
     """
     record = reference[source][channel]
     along, (value, unit, _) = record.abscissa, record.shown
-    flown = along <= float(simulation[reference.abscissa][-1]) + 1e-9
-    if not flown.any():
-        end = f"the run ends at {simulation[reference.abscissa][-1]:.4g}"
-        raise InputError(f"reference {source} {channel}", f"begins at {reference.abscissa} = {along[0]:.4g}", end)
+    flown = compared(along, simulation, reference.abscissa, f"reference {source} {channel}")
     found = rmse(simulation, channel, record.kept(flown), reference.abscissa)
     scatter = record.kept(flown).rms_sigma
     other = _published_rmse(along, value, flown, _published(published, channel, unit)) if channel in published else None
@@ -136,7 +110,7 @@ def errors(
     Raises
     ------
     InputError
-        When the reference begins after the run ends.
+        As ``compared``.
     """
     found: dict[str, dict[str, ChannelError]] = {}
     if case.reference is None:
@@ -185,7 +159,7 @@ def _with_reference(case: Case, path: Path, frame: str | None, trial: str | os.P
     declared = case.reference.frame if case.reference and not frame else _FRAMES[frame or "program"]
     if not path.is_file():
         raise InputError(str(path), "no such file", "a CSV file: source, channel, t or s, value, unit")
-    if trial is not None or not is_long(path):
+    if trial is not None or not is_series(path):
         spec = load_spec(Path(trial) if trial else None)
         return with_trial(case, path, spec.model_copy(update={"frame": _FRAMES[frame]}) if frame else spec, False)
     header = path.read_bytes().partition(b"\n")[0].strip().split(b",")
@@ -267,7 +241,7 @@ def validate(
     else:
         held = referenced(flown, where)
     flown, series = held.case, held.series
-    check_reference(flown, series, where)
+    unknown = check_reference(flown, series, where)
     boat = (fleet or Fleet(os.fspath(db), version, without)).boat(ship)
     simulation, as_started = flights(flown, boat)
     if held.driven is not None:
@@ -301,7 +275,7 @@ def validate(
         in_waves=found_on.in_waves,
         passed=bool(_complete(simulation) and met),
         saturated=saturated(simulation, flown, ship),
-        notes=[*notes, *held.notes],
+        notes=[*notes, *held.notes, *unknown, *beyond_the_run(flown, series, simulation, as_started)],
         metrics_sigma={k: v for k, v in held.sigma.items() if k in found_on.metrics},
     )
 

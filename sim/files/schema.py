@@ -60,7 +60,7 @@ class FrameData(Data):
 
 
 # Larger numbers are slips of the pen, and their powers leave the floating-point range.
-_LARGEST = 1e15
+LARGEST = 1e15
 
 
 # A file of deeper parts is none of this program's.
@@ -78,10 +78,10 @@ def _too_large(data: Any) -> tuple[str, str, str] | None:
             left += [(f"{key}.{k}" if key else str(k), v, depth + 1) for k, v in reversed(part.items())]
         elif isinstance(part, list):
             left += [(f"{key}[{i}]", v, depth + 1) for i, v in reversed(list(enumerate(part)))]
-        elif isinstance(part, int | float) and not isinstance(part, bool) and abs(part) > _LARGEST:
+        elif isinstance(part, int | float) and not isinstance(part, bool) and abs(part) > LARGEST:
             # Python refuses to write out an integer of thousands of digits.
             shown = f"a number of {part.bit_length()} bits" if isinstance(part, int) else str(part)
-            return key, shown, f"a number of size {_LARGEST:g} at most"
+            return key, shown, f"a number of size {LARGEST:g} at most"
     return None
 
 

@@ -2,25 +2,21 @@
 
 from __future__ import annotations
 
-import math
 from importlib.resources import files
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from sim.boat.vehicle import bundled, read_toml
-from sim.files import inputs
 from sim.files.errors import InputError
 from sim.files.frames import Frame
 from sim.files.record import Record, Written
 from sim.files.schema import Data, FrameData, Name, checked
 from sim.flight.commands import Commands, Event
-
-if TYPE_CHECKING:
-    import pandas as pd
+from sim.flight.reference_table import read_table
 
 Array = NDArray[np.float64]
 Positive = Annotated[float, Field(gt=0)]
@@ -375,20 +371,6 @@ def load_case(name: str | Path) -> tuple[Case, str]:
     return checked(Case, data, where), where
 
 
-def _numbers(table: pd.DataFrame, column: str, path: Path) -> None:
-    """Make a column numbers; only values may be negative. Raises ``InputError`` naming the row that is not."""
-    import pandas as pd
-
-    numbers = pd.to_numeric(table[column], errors="coerce").astype(float)
-    least = -math.inf if column == "value" else 0.0
-    bad = np.flatnonzero(~np.isfinite(numbers) | (numbers < least))
-    if bad.size:
-        place, given = f"{path}, row {bad[0] + 2}, column {column}", table[column].iloc[bad[0]]
-        allowed = "a finite number" if column == "value" else "a finite number, zero or more"
-        raise InputError(place, "nothing or nan" if pd.isna(given) else repr(str(given)), allowed)
-    table[column] = numbers
-
-
 def _from_start(series: Series, channels: list[str]) -> Series:
     """The series with the listed channels beginning at zero."""
     for own in series.data.values():
@@ -403,31 +385,16 @@ def read_series(path: Path, abscissa: Literal["t", "s"], frame: Frame) -> Series
 
     Parameters
     ----------
-    path : CSV with the columns source, channel, t or s, value, unit, and, optional, sigma.
+    path : As ``sim.flight.reference_table.read_table``.
     abscissa : Column over which the series are given.
     frame : Axis directions of the file.
 
     Raises
     ------
     InputError
-        For a missing file or column, or a non-number.
+        As ``read_table``; for values of the abscissa that do not increase, or two units in one series.
     """
-    import pandas as pd
-
-    inputs.note(path)
-    try:
-        table = pd.read_csv(path, dtype={"source": str, "channel": str, "unit": str})
-    except (ValueError, pd.errors.ParserError) as error:
-        raise InputError(str(path), f"not a table: {error}", "a CSV file with a header") from error
-    for column in ("source", "channel", abscissa, "value", "unit"):
-        if column not in table:
-            raise InputError(str(path), f"column {column} missing", f"source, channel, {abscissa}, value, unit")
-    for column in ("source", "channel", "unit"):
-        blank = np.flatnonzero(table[column].isna())
-        if blank.size:
-            raise InputError(f"{path}, row {blank[0] + 2}, column {column}", "nothing", f"a {column}")
-    for column in (abscissa, "value", *(["sigma"] if "sigma" in table else [])):
-        _numbers(table, column, path)
+    table = read_table(path, abscissa)
     data: dict[str, dict[str, Record]] = {}
     for (source, channel), rows in table.groupby(["source", "channel"], sort=False):
         along = rows[abscissa].to_numpy(dtype=float)
