@@ -15,6 +15,7 @@ from ident.calibration.file import load_calibration
 from ident.cli import main
 from ident.validation.bands import fly_samples
 from sim.boat.coefficients import Coefficients
+from sim.boat.mass import Environment
 from sim.boat.vehicle import bundled, load_vehicle
 from sim.files.errors import InputError
 from sim.files.schema import Data, checked
@@ -22,6 +23,9 @@ from sim.flight.case import load_case
 from sim.flight.plausible import check_revolutions, check_start
 from sim.flight.simulate import waves_of
 from sim.flight.trim import NoEquilibrium
+from sim.kernel.assemble import assemble
+
+WATER = Environment(density=1025.0, gravity=9.81)
 
 
 def written(tmp_path, kind: str, name: str, *edits: tuple[str, str]):
@@ -57,6 +61,7 @@ def test_every_bundled_vehicle_can_be(name):
         ("span_axis = [0, 1, -1]", "span_axis = [1, 0, 0]", "stern_plane_1, span_axis"),
         ("span_axis = [0, 1, -1]", "span_axis = [0, 0, 0]", "stern_plane_1, span_axis"),
         ("leading_edge = [-1, 0, 0]", "leading_edge = [0, 1, -1]", "stern_plane_1, span_axis"),
+        ("span_axis = [0, 1, -1]", "span_axis = [0.3, 1, -1]", "stern_plane_1, span_axis"),
         ("limit_deg = 30.0", "limit_deg = 3000.0", "stern_plane_1, limit_deg"),
         ('name = "Hull 2"', 'name = "Hull 1"', "planes and sections"),
     ],
@@ -80,6 +85,27 @@ def test_coefficients_of_parts_that_the_vehicle_lacks_are_not_dropped(tmp_path, 
     vehicle = load_vehicle(written(tmp_path, "vehicles", "bb2", *edits))
     with pytest.raises(InputError, match="vehicle bb2"):
         Coefficients(vehicle, rows)
+
+
+@pytest.mark.parametrize(
+    ("coefficient", "factor", "words"),
+    [
+        ("Z_wdot", -1.0, "in heave"),
+        ("Z_wdot", 10.0, "in heave"),
+        ("X_udot", 100.0, "in surge"),
+        ("K_pdot", -30.0, "in roll"),
+        ("N_vdot", 100.0, "not positive definite"),
+    ],
+)
+def test_added_mass_that_no_water_has_is_not_flown(rows, coefficient, factor, words):
+    """Lamb's bounds of each motion, and the kinetic energy of all together."""
+    vehicle = load_vehicle("bb2")
+    assemble(Coefficients(vehicle, rows), WATER)
+    own = (rows["coefficient"] == coefficient) & (rows["part"] == "hull")
+    assert (rows.loc[own, "value"] != 0.0).any()
+    wrong = rows.assign(value=rows["value"].where(~own, factor * rows["value"]))
+    with pytest.raises(InputError, match=f"added mass.*{words}"):
+        assemble(Coefficients(vehicle, wrong), WATER)
 
 
 @pytest.mark.parametrize("limits", [[0.01, 0.02], [-5.0, -1.0]])

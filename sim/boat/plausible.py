@@ -10,8 +10,15 @@ import numpy as np
 
 from sim.files.errors import InputError
 
-# Cosine between span and chord beyond which a plane has no normal to speak of: 60 degrees apart.
-_ALONG = 0.5
+# Largest cosine between span and chord: 3 degrees off a right angle. The deflection turns about the span axis.
+_ALONG = 0.05
+# Most added mass over displaced mass along, across and in heave, of bodies longer than wide: a sphere has 0.5 each way,
+# a cylinder 1 across (Lamb, *Hydrodynamics*, art. 114 to 115); sail, planes and a free surface beside add to it.
+# Rotations: over displaced mass times length^2 / 12, a rod's; roll turns all of the width that planes have.
+_MOST_ADDED = (1.0, 3.0, 3.0, 3.0, 3.0, 3.0)
+# What errors of measurement may leave below zero, in the same measure.
+_LEAST_ADDED = -0.05
+_MOTIONS = ("surge", "sway", "heave", "roll", "pitch", "yaw")
 # Floating boats displace what they weigh; a submerged one differs by what its planes can carry.
 _OUT_OF_TRIM = 0.5
 # Two positions are each other's mirror image when they differ by less than this part of the length.
@@ -39,6 +46,35 @@ def check_vehicle(vehicle: Any, where: str) -> None:
     """
     for key, found, allowed in _faults(vehicle):
         raise InputError(f"{where}, key {key}", found, allowed)
+
+
+def check_mass(total: Any, added: Any, vehicle: Any) -> None:
+    """Refuse a mass matrix that no body in water has.
+
+    The kinetic energy of body and water is above zero however they move, so that their mass matrix is positive
+    definite; the water's part of each motion is not below zero, nor above the bounds of potential flow.
+
+    Parameters
+    ----------
+    total, added : (6, 6) mass of body and water, and of the water, about the origin [kg, kg m, kg m^2].
+    vehicle : For its displaced mass and length.
+
+    Raises
+    ------
+    InputError
+        Naming the motion, its added mass and what is allowed.
+    """
+    given, where = vehicle.particulars, f"coefficients of vehicle {vehicle.name}, added mass"
+    mass, arm = given.displaced_mass.value, given.length.value**2 / 12.0
+    sizes = np.diag(added) / (mass * np.array([1.0, 1.0, 1.0, arm, arm, arm]))
+    for motion, size, most in zip(_MOTIONS, sizes, _MOST_ADDED, strict=True):
+        if not _LEAST_ADDED <= size <= most:
+            of = "the displaced mass" + ("" if motion in _MOTIONS[:3] else " times length^2 / 12")
+            raise InputError(f"{where} in {motion}", f"{size:.3g} of {of}", f"zero to {most:g} of it")
+    least = float(np.linalg.eigvalsh(0.5 * (total + total.T))[0]) if np.isfinite(total).all() else float("nan")
+    if not least > 0.0:
+        text = "a mass matrix that is not positive definite"
+        raise InputError(where, text, "added masses and levers of one body in water: its kinetic energy is above zero")
 
 
 def _faults(vehicle: Any) -> Iterator[tuple[str, str, str]]:

@@ -17,6 +17,7 @@ from sim.boat.mass import (
     rigid_body_matrix,
     unit_added_masses,
 )
+from sim.boat.plausible import check_mass
 from sim.boat.vehicle import Vehicle
 from sim.files.errors import InputError
 from sim.kernel import layout
@@ -230,6 +231,11 @@ def assemble(coefficients: Coefficients, environment: Environment) -> Model:
     Returns
     -------
     Model of flat arrays, program frame, SI and radians.
+
+    Raises
+    ------
+    InputError
+        As ``sim.boat.plausible.check_mass``.
     """
     vehicle = coefficients.vehicle
     flat = _Flat(coefficients, environment)
@@ -240,6 +246,7 @@ def assemble(coefficients: Coefficients, environment: Environment) -> Model:
     particulars = vehicle.particulars
     added = added_mass_matrix(coefficients, environment)
     total = mass + added
+    check_mass(total, added, vehicle)
     still = [OUTPUTS.index(o) for o in held(vehicle.term_set)]
     numbers = {
         "mass": particulars.mass.value,
