@@ -166,7 +166,7 @@ class Room:
             "case": ("cases/hzz20.toml", "cases/ss5-4m.toml", "cases/turn20-4m.toml", "cases/roll-decay.toml",
                      "cases/depth-change.toml", "starter/zigzag.toml"),
             "reference": ("cases/data/hzz20.csv", "cases/data/roll_decay.csv", "cases/data/turn20_23.69m.csv"),
-            "calibration": ("calibrations/bb2.toml", "starter/calibration.toml"),
+            "calibration": ("calibrations/bb2.toml", "calibrations/bb2-predicted.toml", "starter/calibration.toml"),
             "trial": ("trial.toml", "starter/zigzag_trial.csv"),
         }  # fmt: skip
         self.given = {n: (folder / n).read_text("utf-8") for names in self.whole.values() for n in names}
@@ -211,6 +211,7 @@ class Room:
         """A calibration as far as before its first flight, which takes minutes from there on."""
         from ident.calibration.estimate import problem
         from ident.calibration.file import load_calibration, parameters
+        from ident.estimates.draft import measured_rows
         from sim.boat.database import read_rows
         from sim.boat.vehicle import load_vehicle
 
@@ -219,6 +220,7 @@ class Room:
         if vehicle.name not in self.rows:
             self.rows[vehicle.name] = read_rows(self.db, None, vehicle=vehicle.name)[0]
         rows = self.rows[vehicle.name]
+        rows = measured_rows(rows) if spec.starts_from == "runs" else rows
         chosen = parameters(spec, vehicle, rows, where)
         task = problem(spec, where, vehicle, rows, chosen)
         return said({"groups": {p.group.name: [p.mean, p.sigma] for p in chosen}, "channels": len(task.channels)})

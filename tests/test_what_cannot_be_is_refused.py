@@ -94,7 +94,7 @@ def test_coefficients_of_parts_that_the_vehicle_lacks_are_not_dropped(tmp_path, 
         ("Z_wdot", 10.0, "in heave"),
         ("X_udot", 100.0, "in surge"),
         ("K_pdot", -30.0, "in roll"),
-        ("N_vdot", 100.0, "not positive definite"),
+        ("N_vdot", 1e4, "not positive definite"),
     ],
 )
 def test_added_mass_that_no_water_has_is_not_flown(rows, coefficient, factor, words):
