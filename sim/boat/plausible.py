@@ -13,9 +13,9 @@ from sim.files.errors import InputError
 # Largest cosine between span and chord: 3 degrees off a right angle. The deflection turns about the span axis.
 _ALONG = 0.05
 # Most added mass over displaced mass along, across and in heave, of bodies longer than wide: a sphere has 0.5 each way,
-# a cylinder 1 across (Lamb, *Hydrodynamics*, art. 114 to 115); sail, planes and a free surface beside add to it.
-# Rotations: over displaced mass times length^2 / 12, a rod's; roll turns all of the width that planes have.
-_MOST_ADDED = (1.0, 3.0, 3.0, 3.0, 3.0, 3.0)
+# a cylinder 1 across, an elliptic one b / h across its breadth b (Lamb, *Hydrodynamics*, art. 71, 114 and 115): 5 is a
+# body five times wider than high. Rotations: over displaced mass times length^2 / 12, a rod's.
+_MOST_ADDED = (1.0, 5.0, 5.0, 5.0, 5.0, 5.0)
 # What errors of measurement may leave below zero, in the same measure.
 _LEAST_ADDED = -0.05
 _MOTIONS = ("surge", "sway", "heave", "roll", "pitch", "yaw")
