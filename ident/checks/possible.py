@@ -46,8 +46,9 @@ def states_of_a_boat(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
 
 def _beyond(runs: pd.DataFrame, rule: Rule, name: str, size: pd.Series, most: float, unit: str) -> Iterator[Finding]:
     for file, group in runs[size > most].groupby(together(runs), sort=False):
-        worst = size[group.index].idxmax()
-        what = f"{name} of run {runs.loc[worst, 'run_id']} is {size[worst]:.4g} {unit}, beyond {most:g}"
+        sizes = size[group.index].to_numpy(float)
+        worst = int(sizes.argmax())
+        what = f"{name} of run {group['run_id'].iloc[worst]} is {sizes[worst]:.4g} {unit}, beyond {most:g}"
         yield rule.finding(str(file), rows_of(group), [name], f"{what}; {len(group)} of the runs")
 
 
@@ -60,9 +61,9 @@ def boats_in_the_air(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
         return
     # The keel is about as far below the centre of buoyancy as the sail top is above it.
     whole = math.inf
-    if vehicle is not None and vehicle.particulars.sail_top is not None:
-        particulars = vehicle.particulars
-        whole = 2.0 * abs(particulars.sail_top.value[2] - particulars.centre_of_buoyancy.value[2])
+    top = vehicle.particulars.sail_top if vehicle is not None else None
+    if vehicle is not None and top is not None:
+        whole = 2.0 * abs(top.value[2] - vehicle.particulars.centre_of_buoyancy.value[2])
     for file, group in above.groupby(together(runs), sort=False):
         out = float(-group["D0"].min())
         what = f"D0 = {-out:.4g} m has the sail top {out:.4g} m above the surface"
@@ -79,9 +80,10 @@ def errors_that_leave_nothing(evidence: Evidence, rule: Rule) -> Iterator[Findin
     for are, most in ((~published, rule.limits["run"]), (published, rule.limits["published"])):
         large = runs[are & (runs["rel_sigma"] > most)]
         for file, group in large.groupby(together(runs), sort=False):
-            worst = group["rel_sigma"].idxmax()
-            what = f"rel_sigma = {group['rel_sigma'][worst]:.4g} of run {group['run_id'][worst]} is "
-            what += f"{100.0 * group['rel_sigma'][worst]:.4g} % of the load; {len(group)} of the runs above {most:g}"
+            sizes = group["rel_sigma"].to_numpy(float)
+            worst = int(sizes.argmax())
+            what = f"rel_sigma = {sizes[worst]:.4g} of run {group['run_id'].iloc[worst]} is "
+            what += f"{100.0 * sizes[worst]:.4g} % of the load; {len(group)} of the runs above {most:g}"
             yield rule.finding(str(file), rows_of(group), ["rel_sigma"], what)
 
 
