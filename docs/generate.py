@@ -18,6 +18,7 @@ ROOT = Path(__file__).resolve().parents[1]
 # The documentation is of this checkout, whatever copy of the package is installed.
 sys.path[:0] = [str(ROOT), str(ROOT / "docs")]
 
+import evidence
 from reference_tables import axes_table, key_tables, room_tables, table
 
 import ident
@@ -193,6 +194,7 @@ def main() -> int:
         fitted = ident.fit(ROOT / "raw_captive_data", db)[0]
         coefficients = Coefficients(fitted.campaign.vehicle, fitted.rows)
         readme = {"signs": signs(coefficients), "speed": speed()}
+        boats = {"vehicles": evidence.vehicles(), "appendages": evidence.suboff_differences()}
         if not (only_check or chosen.quick):
             # A calibration takes minutes, so only a full run renews what follows from it.
             ident.calibrate("bb2", db)
@@ -200,8 +202,10 @@ def main() -> int:
             main_case = next(one for one in flown if one.case.name == CASE)
             case_figure(main_case, ROOT / "docs" / f"{CASE}.png")
             readme["accuracy"] = accuracy(board)
+            boats["predictions"] = evidence.predictions(db)
     wanted = {
         ROOT / "README.md": readme,
+        ROOT / "docs" / "evidence.md": boats,
         ROOT / "docs" / "errata.md": {"errata": errata()},
         ROOT / "docs" / "terms.md": {"terms": term_table()},
         ROOT / "docs" / "checks.md": {"checks": check_table()},
