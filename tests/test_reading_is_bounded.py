@@ -21,6 +21,7 @@ import pytest
 from small_campaign import HEADER, RUNS, assert_refused, fitted, write
 
 from ident.captive.campaign import read_campaign
+from ident.checks.check import read_labels
 from sim.files.errors import InputError
 
 posix = pytest.mark.skipif(os.name != "posix", reason="pipes and links of POSIX")
@@ -63,6 +64,20 @@ def test_a_pipe_among_the_runs_is_refused_at_once(tmp_path):
         [sys.executable, "-c", script, str(folder)], capture_output=True, text=True, timeout=120, check=True
     )
     assert "a pipe or a device" in done.stdout
+
+
+@posix
+def test_a_pipe_among_the_descriptions_is_passed_over(tmp_path):
+    folder = write(tmp_path / "campaign")
+    os.mkfifo(folder / "channels.txt")
+    assert read_labels(folder) is None
+
+
+def test_a_campaign_file_that_nobody_wrote_is_refused_before_it_is_read(tmp_path):
+    folder = write(tmp_path / "campaign")
+    with (folder / "campaign.toml").open("r+b") as stream:
+        stream.truncate(1 << 30)
+    assert_refused(folder, "campaign.toml", "1073741824 bytes")
 
 
 @posix

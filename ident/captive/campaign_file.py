@@ -10,6 +10,7 @@ from pydantic import Field, field_validator, model_validator
 
 from ident.captive.source import Source, Vector
 from sim.boat.catalogue import OUTPUTS
+from sim.files import inputs
 from sim.files.errors import InputError
 from sim.files.frames import Frame, FrameError
 from sim.files.schema import Data, FrameData, checked
@@ -346,7 +347,7 @@ def read_header(folder: Path) -> tuple[CampaignFile, bytes]:
     path = folder / "campaign.toml"
     if not path.is_file():
         raise InputError(str(path), "missing", "a campaign folder holds campaign.toml and one CSV a test")
-    raw = path.read_bytes()
+    raw = inputs.statements(path)
     try:
         data = tomllib.loads(raw.decode("utf-8"))
     except (ValueError, RecursionError) as error:

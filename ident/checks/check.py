@@ -6,6 +6,7 @@ derivatives, registered by name; ``data/checks.csv`` holds their limits and reme
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Sequence
 from dataclasses import replace
@@ -127,7 +128,8 @@ def read_labels(folder: Path) -> pd.DataFrame | None:
     """
     found = []
     pattern = re.compile(r"^(?:\[(?P<sheet>[^\]]*)\])?\s*\d+\s*\|(?P<name>[^|]*)\|[^|]*\|(?P<text>[^|]*)$")
-    for path in sorted(folder.glob("*.txt")):
+    # Opening a pipe would wait for who writes to it.
+    for path in sorted(p for p in folder.glob("*.txt") if p.is_file() and os.access(p, os.R_OK)):
         # Line by line: a tank file of any size may be a .txt beside the campaign.
         with path.open(encoding="utf-8", errors="replace") as stream:
             for row, line in enumerate(stream, start=1):

@@ -419,10 +419,10 @@ def read_toml(name: str | Path, kind: str, named_in: str = "") -> tuple[dict[str
         if named_in:
             raise InputError(named_in, f"{str(name)[:200]!r}: {found}", text)
         raise InputError(str(name)[:200], found, text)
-    inputs.note(path)
+    raw = inputs.statements(path)
     try:
-        return tomllib.loads(path.read_text("utf-8")), str(path)
-    except (OSError, ValueError, RecursionError) as error:
+        return tomllib.loads(raw.decode("utf-8")), str(path)
+    except (ValueError, RecursionError) as error:
         raise InputError(str(path), f"not TOML: {error}", "a TOML file in UTF-8") from error
 
 

@@ -6,6 +6,10 @@ import os
 from contextvars import ContextVar
 from pathlib import Path
 
+from sim.files.errors import InputError
+
+# Files of statements are written by hand [bytes]; data stand in tables.
+_LARGEST_STATEMENT = 1 << 24
 _read: ContextVar[set[Path] | None] = ContextVar("files a command has read", default=None)
 
 
@@ -24,3 +28,21 @@ def note(path: Path) -> None:
 def is_read(path: Path) -> bool:
     """Whether a file has been read since ``begin``."""
     return Path(os.path.realpath(path)) in (_read.get() or ())
+
+
+def statements(path: Path) -> bytes:
+    """Content of a file of statements, campaign, vehicle or case, which is noted as read.
+
+    Raises
+    ------
+    InputError
+        For a file that may not be read, or is none that somebody wrote.
+    """
+    note(path)
+    try:
+        size = path.stat().st_size
+        if size > _LARGEST_STATEMENT:
+            raise InputError(str(path), f"{size} bytes", f"a TOML file of {_LARGEST_STATEMENT} bytes at most")
+        return path.read_bytes()
+    except OSError as error:
+        raise InputError(str(path), f"cannot be read: {error.strerror}", "a file you may read") from error
