@@ -25,7 +25,6 @@ from pathlib import Path
 
 KINDS = ("vehicle", "case", "reference", "calibration", "trial")
 _STARTER = files("ident") / "starter" / "files"
-_SLOWEST = 60.0
 _NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?:e-?\d+)?(?![\w.])")
 _TEXT = re.compile(r'"([^"\n]*)"')
 _WORDS = [
@@ -289,6 +288,7 @@ def main() -> int:
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--log", type=Path, default=None)
     parser.add_argument("--db", default="", help="A database with bb2, suboff and my-boat; fitted when left out.")
+    parser.add_argument("--slowest", type=float, default=60.0, help="Longest time for one of them [s].")
     parser.add_argument("--some", action="store_true", help=argparse.SUPPRESS)
     given = parser.parse_args()
     log = given.log or Path(f"{given.kind}.txt")
@@ -298,16 +298,17 @@ def main() -> int:
     with tempfile.TemporaryDirectory() as folder:
         db = given.db or database(Path(folder))
         before = digest(db)
-        slow = _watched(given.kind, given.first, given.first + given.count, db, log)
+        slow = _watched(given, db, log)
         changed = digest(db) != before
     found = [json.loads(line) for line in log.read_text("utf-8").splitlines() if line.startswith("{")]
     count = {w: sum(f["what"] == w for f in found) for w in ("accepted", "refused", "fault")}
-    print(f"{given.kind}: {count}, slower than {_SLOWEST:g} s: {slow}, database changed: {changed}")
+    print(f"{given.kind}: {count}, slower than {given.slowest:g} s: {slow}, database changed: {changed}")
     return int(bool(count["fault"] or slow or changed))
 
 
-def _watched(kind: str, first: int, last: int, db: str, log: Path) -> list[int]:
+def _watched(given: argparse.Namespace, db: str, log: Path) -> list[int]:
     """Mutants that took too long; each hundred in a process that is ended when one does."""
+    kind, first, last = given.kind, given.first, given.first + given.count
     slow: list[int] = []
     while first < last:
         upto = min(first + 100, last)
@@ -319,7 +320,7 @@ def _watched(kind: str, first: int, last: int, db: str, log: Path) -> list[int]:
                 size = log.stat().st_size if log.exists() else 0
                 if size != seen:
                     seen, since = size, time.monotonic()
-                elif time.monotonic() - since > _SLOWEST + 60.0 * (seen == 0):
+                elif time.monotonic() - since > given.slowest:
                     process.kill()
             done = process.returncode
         at = upto

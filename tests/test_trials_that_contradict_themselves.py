@@ -8,7 +8,7 @@ from click.testing import CliRunner
 from trial_records import truth, turn, write, zigzag
 
 from ident.cli import main
-from ident.trials.spec import TrialFile
+from ident.trials.spec import TrialFile, load_spec
 from ident.trials.trial import measure_trial
 from sim.files.errors import InputError
 
@@ -129,3 +129,32 @@ def test_clock_that_steps_back_is_refused(tmp_path):
     record["t [s]"] = record["t [s]"].copy()
     record["t [s]"][100:] -= 20.0
     assert "after" in refusal(tmp_path, record).found
+
+
+def test_a_long_table_has_one_unit_a_channel_and_names_what_it_does_not_use(tmp_path):
+    one = zigzag()
+    rows = [f"{name},{t},{v},deg,good" for name in ("psi", "dH") for t, v in zip(one["t"], one[name], strict=True)]
+    path = tmp_path / "long.csv"
+    path.write_text("\n".join(["channel,t,value,unit,sourcex", *rows]), encoding="utf-8")
+    assert "column not used: sourcex" in measure_trial(path, None, COUNT).assumed
+    rows[7] = rows[7].replace(",deg,", ",rad,")
+    path.write_text("\n".join(["channel,t,value,unit,sourcex", *rows]), encoding="utf-8")
+    with pytest.raises(InputError, match=r"row 9, column unit: 'rad'.*one unit a channel"):
+        measure_trial(path, None, COUNT)
+
+
+@pytest.mark.parametrize("key", ["skip", "header_pattern"])
+def test_an_expression_that_is_none_is_refused_with_its_key(tmp_path, key):
+    (tmp_path / "trial.toml").write_text(f"{key} = '(?=a)'\n", encoding="utf-8")
+    with pytest.raises(InputError, match=f"{key}.*no look-around"):
+        load_spec(tmp_path / "trial.toml")
+
+
+def test_a_header_of_thousands_of_characters_is_found_below_a_title(tmp_path):
+    one = zigzag()
+    names = ["t [s]", "psi [deg]", "delta [deg]", *[f"channel {'x' * 50} {k}" for k in range(60)]]
+    rows = [",".join([f"{a},{b},{c}", *["0"] * 60]) for a, b, c in zip(one["t"], one["psi"], one["dH"], strict=True)]
+    path = tmp_path / "wide.csv"
+    path.write_text("\n".join(["Trial of a boat", ",".join(names), *rows]), encoding="utf-8")
+    spec = TrialFile(delimiter=",")
+    assert measure_trial(path, spec, COUNT).metrics["overshoot_1_deg"].value > 0.0

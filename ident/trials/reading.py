@@ -257,11 +257,17 @@ def _long(
         raise InputError(
             f"{sheet.path}, column source", f"{len(sources)} sources: {', '.join(sources)[:120]}", "one trial a file"
         )
+    used = {clock, named, *at.values()}
+    said += [f"column not used: {h}" for i, h in enumerate(header) if i not in used and h.strip()]
     channels, headers, findings = {}, {"t": header[clock]}, []
     everything: list[tuple[Array, list[int]]] = []
     for name in dict.fromkeys(c[at["channel"]] for c in cells):
         mine = [i for i, c in enumerate(cells) if c[at["channel"]] == name]
         unit = cells[mine[0]][at["unit"]]
+        other = next((i for i in mine if cells[i][at["unit"]].strip() != unit.strip()), None)
+        if other is not None:
+            where, found = f"{sheet.path}, row {rows[other]}, column unit", repr(cells[other][at["unit"]][:40])
+            raise InputError(where, found, f"{unit!r}, as in row {rows[mine[0]]}: one unit a channel")
         what = meaning(f"{name} [{unit}]", spec.channels.get(name), f"{sheet.path}, row {rows[mine[0]]}")
         if what is None:
             said.append(f"channel not used: {name}")

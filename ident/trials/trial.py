@@ -137,9 +137,14 @@ def measure_trial(path: Path, spec: TrialFile | None = None, count: int = DRAWS)
     track = maneuver.kind in ("turning_circle", "stopping")
     sure = _borne_out(one, maneuver, findings)
     refused(one, findings, track, sure)
-    start = start_of(one, maneuver, spec)
-    found, taken = paths(one, start, spec)
-    metrics = measured(one, maneuver, start, found, spec, count)
+    try:
+        start = start_of(one, maneuver, spec)
+        found, taken = paths(one, start, spec)
+        metrics = measured(one, maneuver, start, found, spec, count)
+    except np.linalg.LinAlgError as error:
+        named = f"no smooth path through {', '.join(one.headers.values())[:160]}: {error}"
+        remedy = "a record whose samples are even in time and of a size: look at the clock and the units"
+        raise InputError(str(path), named, remedy) from error
     said = (*one.assumed, by, *start.said, *taken)
     done = Trial(one, spec, maneuver, start, found, metrics, said, tuple(findings))
     _swings(done)
