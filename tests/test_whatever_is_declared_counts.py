@@ -447,6 +447,7 @@ TEXTS = {
     "reason": "spoiled",
     "decoupled": "True",
     "coefficient": "Y_v",
+    "unit": "kg/m",
 }
 
 
