@@ -19,7 +19,8 @@ from sim.files.errors import InputError
 if TYPE_CHECKING:
     from rich.console import Console
 
-_SUFFIXES = {".csv", ".txt", ".dat", ".parquet", ".tsv", ".asc"}
+# What lies beside records in a folder and is none.
+_NO_RECORDS = {".toml", ".png", ".md", ".json", ".pdf", ".html", ".py", ".docx"}
 
 
 @dataclass(frozen=True)
@@ -68,9 +69,10 @@ def measure_all(path: Path, spec: TrialFile) -> Trials:
     """
     if not path.is_dir():
         return Trials((measure_trial(path, spec),), (), False)
-    files = sorted(p for p in path.iterdir() if p.suffix.lower() in _SUFFIXES)
+    there = (p for p in path.iterdir() if p.is_file() and not p.name.startswith((".", "~")))
+    files = sorted(p for p in there if p.suffix.lower() not in _NO_RECORDS)
     if not files:
-        raise InputError(str(path), "no record", f"files of the kinds {', '.join(sorted(_SUFFIXES))}")
+        raise InputError(str(path), "no record", "a folder with tables of recorded maneuvers")
     trials, refused = [], []
     for one in files:
         beside = one.with_suffix(".toml")
