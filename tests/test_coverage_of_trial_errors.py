@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy.interpolate import make_interp_spline
+from scipy.signal import lfilter
 from trial_records import truth, turn, write, zigzag
 
 from ident.trials.spec import TrialFile
@@ -30,6 +31,15 @@ def zigzag_record(rate_hz, heading_deg, rng):
     return {"t [s]": one["t"], "psi [deg]": one["psi"] + rng.normal(0.0, heading_deg, one["t"].size)}
 
 
+def filtered_record(rate_hz, heading_deg, rng, seconds=1.0):
+    """Heading noise behind a filter of the first order, as a gyro's output is damped."""
+    one = sampled(zigzag(), rate_hz)
+    a = np.exp(-1.0 / (rate_hz * seconds))
+    white = rng.standard_normal(one["t"].size + 1000)
+    noise = lfilter([heading_deg * np.sqrt(1.0 - a * a)], [1.0, -a], white)[1000:]
+    return {"t [s]": one["t"], "psi [deg]": one["psi"] + noise}
+
+
 def turn_record(rate_hz, position_m, rng):
     one = sampled(turn(), rate_hz)
     n = one["t"].size
@@ -40,8 +50,9 @@ def turn_record(rate_hz, position_m, rng):
 
 def errors(kind, rate_hz, noise, records, folder, draws=60):
     """(records, metrics) errors in standard errors."""
-    make, known = (zigzag_record, truth()["zigzag"]) if kind == "zigzag" else (turn_record, truth()["turn"])
-    spec = TrialFile(maneuver="zigzag 20/20" if kind == "zigzag" else "turning_circle")
+    make = {"zigzag": zigzag_record, "turn": turn_record, "filtered": filtered_record}[kind]
+    known = truth()["turn" if kind == "turn" else "zigzag"]
+    spec = TrialFile(maneuver="turning_circle" if kind == "turn" else "zigzag 20/20")
     found = []
     for seed in range(records):
         path = write(folder / "record.csv", make(rate_hz, noise, np.random.default_rng(1000 + seed)), 6)
@@ -52,7 +63,7 @@ def errors(kind, rate_hz, noise, records, folder, draws=60):
 
 @pytest.mark.parametrize(
     ("kind", "rate_hz", "noise", "records"),
-    [("zigzag", 2, 0.1, 30), ("zigzag", 10, 0.5, 20), ("turn", 2, 1.0, 12)],
+    [("zigzag", 2, 0.1, 30), ("zigzag", 10, 0.5, 20), ("turn", 2, 1.0, 12), ("filtered", 10, 0.1, 20)],
 )
 def test_intervals_cover_the_exact_flight(tmp_path, kind, rate_hz, noise, records):
     away = errors(kind, rate_hz, noise, records, tmp_path)
@@ -64,10 +75,13 @@ def test_intervals_cover_the_exact_flight(tmp_path, kind, rate_hz, noise, record
     assert np.abs(away).max() < 4.5
 
 
+NOISES = {"zigzag": (0.0, 0.05, 0.1, 0.2, 0.5), "turn": (0.0, 0.5, 1.0, 2.0), "filtered": (0.1, 0.3)}
+
+
 def main(records: int) -> None:
     """The whole table, printed."""
     with tempfile.TemporaryDirectory() as folder:
-        for kind, noises in (("zigzag", (0.0, 0.05, 0.1, 0.2, 0.5)), ("turn", (0.0, 0.5, 1.0, 2.0))):
+        for kind, noises in NOISES.items():
             for rate_hz in (1, 2, 10, 50):
                 for noise in noises:
                     away = errors(kind, rate_hz, noise, records if noise else 2, Path(folder))

@@ -209,6 +209,55 @@ def test_lvm_files(tmp_path, separator):
     assert_means(reduced(tmp_path, "run.lvm", named))
 
 
+# -- universal files ----------------------------------------------------------------------------------
+
+
+AXES = ("abscissa", "ordinate", "orddenom", "z_axis")
+
+
+@pytest.mark.parametrize("binary", [0, 1])
+@pytest.mark.parametrize("named", ["rsp_ent_name", "id1"])
+def test_universal_files_of_pyuff(tmp_path, binary, named):
+    """Dataset 58 as analysers such as Simcenter Testlab export it, between datasets of other kinds."""
+    pyuff = pytest.importorskip("pyuff")
+    made = [
+        pyuff.prepare_151(model_name="pmm", description="tank", db_app="made", program="made", return_full_dict=True)
+    ]
+    for i, (name, unit) in enumerate({"X": "kN", "Y": "N", "N": "N m"}.items()):
+        own = {"rsp_ent_name": name} if named == "rsp_ent_name" else {"rsp_ent_name": "NONE"}
+        one = pyuff.prepare_58(
+            binary=binary,
+            func_type=1,
+            rsp_node=1,
+            rsp_dir=i + 1,
+            ref_node=1,
+            ref_dir=1,
+            data=SERIES[:, i] / (1000.0 if unit == "kN" else 1.0),
+            x=TIME,
+            id1=name if named == "id1" else "run 7",
+            ordinate_axis_units_lab=unit,
+            abscissa_axis_units_lab="s",
+            abscissa_spacing=1,
+            abscissa_min=0.0,
+            abscissa_inc=0.05,
+            ord_data_type=4,
+            **own,
+            **dict.fromkeys(("ver_num", "load_case_id", "abscissa_spec_data_type"), 0),
+            z_axis_value=0.0,
+            **{f"{a}_{e}_unit_exp": 0 for a in AXES for e in ("len", "force", "temp")},
+            **{f"{a}_spec_data_type": 0 for a in AXES[1:]},
+            return_full_dict=True,
+        )
+        made.append(one)
+    pyuff.UFF(str(tmp_path / "run.unv")).write_sets(made, mode="overwrite")
+    assert reader_of(tmp_path / "run.unv", Source(files="run.unv")) == "universal"
+    assert_means(reduced(tmp_path, "run.unv"))
+    whole = (tmp_path / "run.unv").read_bytes()
+    (tmp_path / "run.unv").write_bytes(whole[: len(whole) // 3])
+    with pytest.raises(InputError, match=r"run\.unv"):
+        reduced(tmp_path, "run.unv")
+
+
 # -- solvers ------------------------------------------------------------------------------------------
 
 NAMED = '[source.columns]\n"{0}" = "time [s]"\n"{1}" = "X [N]"\n"{2}" = "Y [N]"\n"{3}" = "N [N m]"\n'
@@ -224,6 +273,32 @@ def test_fluent_report_files_by_their_header(tmp_path):
     (tmp_path / "run.out").write_text("\n".join(lines), "utf-8")
     names = NAMED.format("flow-time", "force-x", "force-y", "moment-z")
     assert_means(reduced(tmp_path, "run.out", 'ignore = ["Time Step"]\n' + names))
+
+
+@pytest.mark.parametrize("form", ["cfx5mondata", "workspace"])
+def test_cfx_monitors_as_exported(tmp_path, form):
+    """`cfx5mondata -out`: quoted names that hold commas; the workspace of the solver manager: a title above."""
+    if form == "cfx5mondata":
+        lines = ['"ACCUMULATED TIMESTEP","USER POINT,Physical Time","USER POINT,FX","USER POINT,FY","USER POINT,MZ"']
+        names, keys = ("USER POINT,Physical Time", *(f"USER POINT,{c}" for c in ("FX", "FY", "MZ"))), ""
+        ignored = "ACCUMULATED TIMESTEP"
+    else:
+        lines = ["[Name]", "hull_001", "", "[Data]", "Accumulated Time Step, Time [s], FX [N], FY [N], MZ [N m]"]
+        names, keys = ("Time", "FX", "FY", "MZ"), 'header_pattern = "^Accumulated"\ndelimiter = ","\n'
+        ignored = "Accumulated Time Step"
+    lines += [",".join([str(i), *(f"{v:.12e}" for v in row)]) for i, row in enumerate(RECORD.tolist())]
+    (tmp_path / "run.csv").write_text("\n".join(lines) + "\n", "utf-8")
+    assert_means(reduced(tmp_path, "run.csv", f'{keys}ignore = ["{ignored}"]\n' + NAMED.format(*names)))
+
+
+@pytest.mark.parametrize("mark", ["#", ""])
+def test_columns_of_efforts_below_lines_of_comment(tmp_path, mark):
+    """Text columns in exponents below comments, as FINE/Marine and other solvers write efforts."""
+    lines = [f"{mark} Efforts on body 1", f"{mark} Time  Fx  Fy  Mz"]
+    lines += ["  ".join(f"{v:16.9E}" for v in row) for row in RECORD.tolist()]
+    (tmp_path / "run.dat").write_text("\n".join(lines) + "\n", "utf-8")
+    keys = 'header_pattern = "Time +Fx"\n' + NAMED.format("Time", "Fx", "Fy", "Mz")
+    assert_means(reduced(tmp_path, "run.dat", keys))
 
 
 def test_plots_with_an_abscissa_each_are_joined_where_all_have_one(tmp_path):

@@ -105,6 +105,64 @@ def test_a_stated_delay_of_the_load_channels_is_taken_off(tmp_path):
     assert_law(swayed(tmp_path / "b", table, reduction=SWAY + "delay_s = { Y = 0.05, N = 0.05 }\n"))
 
 
+def started(lag: float) -> pd.DataFrame:
+    """Sway from rest with a smooth ramp over two cycles, loads by the law and late by ``lag``."""
+    table = record()
+
+    def motion(t):
+        at = math.pi * np.clip(t / 8.0, 0.0, 1.0)
+        ramp, rate, bend = 0.5 - 0.5 * np.cos(at), np.sin(at) * math.pi / 16.0, np.cos(at) * math.pi**2 / 128.0
+        bend = np.where((t > 0.0) & (t < 8.0), bend, 0.0)
+        s, c = np.sin(OMEGA * t), np.cos(OMEGA * t)
+        v = rate * s + ramp * OMEGA * c
+        a = bend * s + 2.0 * rate * OMEGA * c - ramp * OMEGA**2 * s
+        return AMPLITUDE * ramp * s, AMPLITUDE * v, AMPLITUDE * a
+
+    t = table["time_s"].to_numpy()
+    noise = np.random.default_rng(3).standard_normal((t.size, 2)) * [2.0, 1.0]
+    _, v, a = motion(t - lag)
+    table["displacement_m"] = motion(t)[0]
+    table["Y_N"], table["N_Nm"] = YV * v + YVDOT * a + noise[:, 0], NV * v + NVDOT * a + noise[:, 1]
+    return table
+
+
+@pytest.mark.parametrize("lag", [0.0, 0.05, -0.03])
+def test_a_delay_of_the_loads_is_found_where_the_motion_starts_from_rest(tmp_path, lag):
+    """And the stated one is taken off what is found."""
+    swayed(tmp_path / "a", started(lag))
+    (one,) = read_campaign(tmp_path / "a").reduced
+    (late,) = one.delays
+    assert abs(late.seconds - lag) < 3.0 * late.stderr
+    assert late.stderr < 0.01
+    found = [f for f in check_campaign(read_campaign(tmp_path / "a"), tmp_path / "a") if f.check == "delay"]
+    assert bool(found) == bool(lag)
+    if lag:
+        delays = f"delay_s = {{ Y = {lag}, N = {lag} }}\nstart_s = 12.0\n"
+        assert_law(swayed(tmp_path / "b", started(lag), reduction=SWAY + delays), rel=0.02)
+        delays = f"delay_s = {{ X = {lag}, Y = {lag}, N = {lag} }}\n"
+        swayed(tmp_path / "c", started(lag), reduction=SWAY + delays)
+        assert not [f for f in check_campaign(read_campaign(tmp_path / "c"), tmp_path / "c") if f.check == "delay"]
+
+
+def test_a_steady_oscillation_shows_no_delay_and_none_is_named(tmp_path):
+    """One line: a lag is another added mass, so nothing may be said."""
+    swayed(tmp_path, record())
+    assert not read_campaign(tmp_path).reduced[0].delays
+
+
+@pytest.mark.parametrize("late", [0.0, 0.04])
+def test_a_measured_acceleration_has_its_amplitude_and_shows_the_delay_of_its_system(tmp_path, late):
+    table = record()
+    table["vdot_mps2"] = -AMPLITUDE * OMEGA**2 * np.sin(OMEGA * (table["time_s"] - late))
+    table["vdot_mps2"] += 0.01 * np.random.default_rng(8).standard_normal(len(table))
+    assert_law(swayed(tmp_path, table))
+    found = [f for f in check_campaign(read_campaign(tmp_path), tmp_path) if f.check == "delay"]
+    assert bool(found) == bool(late)
+    (one,) = read_campaign(tmp_path).reduced[0].delays
+    assert abs(one.seconds - late) < 4.0 * one.stderr
+    assert one.stderr < 1e-3
+
+
 # -- where the loads are -------------------------------------------------------------------------
 
 
@@ -206,6 +264,7 @@ def test_faults_of_a_channel_are_left_out_and_named(tmp_path, fault):
     assert f"{kind} samples of Y left out" in run["reduction"]
     assert {k for k, name in done.reduced[0].left_out if name == "Y"} == {kind}
     assert {name for _, name in done.reduced[0].left_out} == {"Y"}
+    assert not done.reduced[0].clipped
 
 
 def test_a_clipped_channel_is_an_error(tmp_path):

@@ -254,6 +254,9 @@ def test_clocks_of_recorders(tmp_path, header, stamp):
         ("words.csv", "Time / s,Heading / deg,Rudder / deg\n"),
         ("suffix.csv", "time_s,psi_deg,dH_deg\n"),
         ("columns.dat", "# 20/20 zigzag\n# t[s]  psi[deg]  delta[deg]\n"),
+        ("greek.csv", "t / s,\u03c8 / \u00b0,\u03b4 / \u00b0\n"),
+        ("tank.dat", "Test 23456, KVLCC2 zig-zag 20/20, full scale\nTIME[s]  PSI[deg]  DELTA[deg]\n"),
+        ("yard.csv", "time (s),heading (deg),rudder angle (deg)\n"),
     ],
 )
 def test_headers_of_recorders(tmp_path, name, text):

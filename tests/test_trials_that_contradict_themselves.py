@@ -8,6 +8,7 @@ from click.testing import CliRunner
 from trial_records import truth, turn, write, zigzag
 
 from ident.cli import main
+from ident.trials.consistency import factor_between
 from ident.trials.spec import TrialFile, load_spec
 from ident.trials.trial import measure_trial
 from sim.files.errors import InputError
@@ -158,3 +159,67 @@ def test_a_header_of_thousands_of_characters_is_found_below_a_title(tmp_path):
     path.write_text("\n".join(["Trial of a boat", ",".join(names), *rows]), encoding="utf-8")
     spec = TrialFile(delimiter=",")
     assert measure_trial(path, spec, COUNT).metrics["overshoot_1_deg"].value > 0.0
+
+
+def test_slips_of_units_are_made_from_the_units_themselves():
+    """The numbers one knows: 57.3, 60, 1.94, 3.6, 3.28, 1.852, 3438, 9.81, 1000."""
+    known = (57.29578, 60.0, 1.943844, 3.6, 3.280840, 1.852, 3437.747, 9.80665, 1000.0)
+    for value in known:
+        for ratio in (value, 1.0 / value):
+            one, words = factor_between(ratio)
+            assert abs(one / ratio - 1.0) < 2e-6, words
+    assert factor_between(1.3) is None
+
+
+def every_channel():
+    """The zigzag with all channels that a recorder has, heel of its own, noise of good instruments."""
+    one = zigzag()
+    t, psi = one["t"], np.radians(one["psi"])
+    dx, dy = np.gradient(one["x"], t), np.gradient(one["y"], t)
+    heel = np.interp(t - 4.0, t, one["r"]) ** 2 - 0.8 * np.interp(t - 2.0, t, one["r"])
+    record = zigzag_columns() | {"v [m/s]": dy * np.cos(psi) - dx * np.sin(psi)}
+    record |= {"phi [deg]": heel, "p [deg/s]": np.gradient(heel, t)}
+    rng = np.random.default_rng(1)
+    sizes = {"psi [deg]": 0.1, "r [deg/s]": 0.02, "x [m]": 0.3, "y [m]": 0.3, "phi [deg]": 0.02}
+    sizes |= {"u [m/s]": 0.02, "v [m/s]": 0.02, "p [deg/s]": 0.01}
+    return {k: v + sizes.get(k, 0.0) * rng.standard_normal(v.size) for k, v in record.items()}
+
+
+NAMED = [("psi [deg]", other) for other in ("u [m/s]", "v [m/s]", "y [m]", "phi [deg]", "delta [deg]")]
+NAMED += [("r [deg/s]", other) for other in ("u [m/s]", "p [deg/s]", "delta [deg]")]
+NAMED += [("u [m/s]", "v [m/s]"), ("phi [deg]", "p [deg/s]"), ("v [m/s]", "delta [deg]"), ("y [m]", "delta [deg]")]
+
+
+@pytest.mark.parametrize("pair", NAMED, ids=["-".join(p).replace(" ", "") for p in NAMED])
+def test_two_channels_exchanged_are_refused_by_name(tmp_path, pair):
+    record = every_channel()
+    first, second = pair
+    record[first], record[second] = record[second], record[first]
+    error = refusal(tmp_path, record)
+    assert "exchanged" in str(error)
+    assert first in str(error) or second in str(error)
+
+
+def test_a_sound_record_of_all_channels_is_measured_and_x_and_y_are_told_apart(tmp_path):
+    record = every_channel()
+    whole = measure_trial(write(tmp_path / "one.csv", record), None, COUNT)
+    assert not [f for f in whole.findings if f.severity == "error"]
+    assert_truth(whole)
+    record["x [m]"], record["y [m]"] = record["y [m]"], record["x [m]"]
+    turned = measure_trial(write(tmp_path / "two.csv", record), None, COUNT)
+    assert_truth(turned)
+    assert any("x east, y north" in text for text in turned.assumed)
+
+
+def assert_truth(trial):
+    for name, value in truth()["zigzag"].items():
+        measured = trial.metrics[name]
+        assert abs(measured.value - value) < 4.0 * measured.sigma, name
+
+
+def test_a_flight_as_ident_fly_writes_it_has_two_depths_and_one_is_used(tmp_path):
+    record = zigzag_columns()
+    record |= {"z [m]": np.full_like(record["t [s]"], 30.0), "D0 [m]": np.full_like(record["t [s]"], 25.0)}
+    found = measure_trial(write(tmp_path / "one.csv", record), None, COUNT)
+    assert found.recording.channels["z"].value[0] == 30.0
+    assert any("D0 [m]: not used" in text for text in found.assumed)

@@ -335,6 +335,16 @@ SOURCE_CASES: dict[str, tuple[dict[str, Any], dict[str, Any], dict[str, Any]]] =
     "Source.factor": (of(DRIFT), of(DRIFT, factor={"Y": -1.0}), {}),
     "Source.missing": (of(DRIFT), of(DRIFT, missing=[-629000.0]), {}),
     "Source.words": (of(DRIFT), of(DRIFT, words={"rudder": "towing"}), {}),
+    "Source.plus_minus": (
+        of(DRIFT),
+        of(DRIFT, plus_minus=1.96),
+        {"files": {"drift.csv": ROWS.replace("-336000,", "-336000 \u00b1 5000,")}},
+    ),
+    "Source.marks": (
+        of(DRIFT),
+        of(DRIFT, marks={"*": "poor"}),
+        {"files": {"drift.csv": ROWS.replace("-336000,", "-336000*,")}},
+    ),
     "Source.reference": (of(DRIFT), of(DRIFT, reference={"area_m2": 1.0, "source": "x"}), {}),
     "Source.reduction": (of(DRIFT), of(DRIFT, reduction={"kind": "steady"}), {}),
     "Source.subtract": (of(DRIFT, ignore=["R*"]), of(DRIFT, subtract=[TAKEN]), {"files": {"drift.csv": PART}}),

@@ -21,6 +21,7 @@ import pandas as pd
 from ident.captive import published
 from ident.captive.axes import to_body
 from ident.captive.campaign_file import CampaignFile, read_header
+from ident.captive.channels import NotRising
 from ident.captive.conversions import (
     arm_rates,
     deflected_left_out,
@@ -34,7 +35,7 @@ from ident.captive.conversions import (
     without_inertia,
     without_tare,
 )
-from ident.captive.histories import NotRising, Reduced
+from ident.captive.histories import Reduced
 from ident.captive.readers.opening import inputs
 from ident.captive.run_table import DIRECT, MEASURED, NUMBERS, run_table, sigma
 from ident.captive.runs import Found, source_runs

@@ -90,7 +90,7 @@ def combined(campaigns: Sequence[Campaign], paths: Sequence[Path]) -> Campaign:
     )
     refused = tuple(one for c in campaigns for one in c.refused)
     runs = pd.concat(tables, ignore_index=True)
-    for text in ("copy_of", "exclude", "reason", "reduction", "coefficient", "unit", "decoupled"):
+    for text in ("copy_of", "exclude", "reason", "reduction", "coefficient", "unit", "decoupled", "notes"):
         runs[text] = runs[text].fillna("").astype(str)
     members = dict(zip(names, campaigns, strict=True))
     return replace(first, header=header, runs=runs, digests=digests, reduced=reduced, refused=refused, members=members)

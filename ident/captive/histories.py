@@ -1,86 +1,27 @@
-"""A time history to runs: window, reduction, and the states of an oscillation."""
+"""A time history to runs: window, sound samples, reduction."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ident.captive import delay
+from ident.captive.channels import Channels, Timed, timed
+from ident.captive.motion import frequency_of, line_of, phase_is_known
+from ident.captive.oscillation import PHASES
 from ident.captive.quantities import HARMONICS, TAKEN
 from ident.captive.source import MOTIONS, Reduction
 from ident.timeseries import blocks as condense
 from ident.timeseries import reduction
 from ident.timeseries.clock import Clock
 from ident.timeseries.faults import Usual, usual
-from ident.timeseries.frequency import Line, estimate
+from ident.timeseries.frequency import Line
 from sim.boat.catalogue import OUTPUTS
-from sim.boat.forces import body_velocity
 from sim.files.errors import InputError
-from sim.files.frames import Frame
-
-Array = NDArray[np.float64]
-Pieces = Callable[[], Iterator[Array]]
-# (time, values, displacement at each sample) -> values along the body's axes, about its moving point.
-Moving = Callable[[Array, Array, Array], Array]
-
-# The four states of an oscillation: name, phase of the displacement A sin(theta).
-PHASES = {"+v": 0.0, "-v": math.pi, "+a": math.pi / 2, "-a": 3 * math.pi / 2}
-# Amplitudes of rate and acceleration in a table are printed with three digits or more.
-_AGREE = 0.02
-# A stated frequency that is off by more than this part of itself is another test's; one that the record
-# contradicts by so many standard errors, and by so many cycles from end to end, is replaced by the record's.
-_OFF = 0.05
-_SURE = 4.0
-_DRIFT = 2e-3
-# A clock that starts later than so many steps does not start with the motion.
-_LATE = 1.5
-# Test whose terms a state at the end of the velocity identifies.
-_STEADY_TEST = {"surge": "towing", "sway": "drift_horizontal", "heave": "drift_vertical"}
-
-
-@dataclass(frozen=True)
-class Channels:
-    """The channels of one history.
-
-    Attributes
-    ----------
-    path : File or folder they come from.
-    quantities : ``time`` (unless a rate is stated), loads, and measured states.
-    pieces : Starts reading; blocks (rows, channels) in SI.
-    first_row : File row of the first sample.
-    missing : Channel -> stated values that stand for "nothing measured", in SI.
-    moving : Turns loads and moves moments of a body that moves in their axes.
-    """
-
-    path: Path
-    quantities: list[str]
-    pieces: Pieces
-    first_row: int = 2
-    missing: dict[str, tuple[float, ...]] = field(default_factory=dict)
-    moving: Moving | None = None
-
-
-class NotRising(InputError):
-    """A history whose time stamps do not rise, with nothing to stand in for them.
-
-    Attributes
-    ----------
-    file : Of the run.
-    row : Of the data, where time first does not rise.
-    clock : All of its stamps.
-    first_row : File row of the first stamp.
-    """
-
-    def __init__(self, channels: Channels, clock: Clock, at: int, found: str) -> None:
-        text = "a time that rises; or rate_hz in [source.reduction] where stamps have too few digits"
-        super().__init__(f"{channels.path}, data row {at + 1}, column time", found, text)
-        self.file, self.row = channels.path.name, at + 1
-        self.clock, self.first_row = clock, channels.first_row
 
 
 @dataclass(frozen=True)
@@ -101,6 +42,7 @@ class Reduced:
     samples : All of them, in the window.
     stated_hz : Frequency of an oscillation as stated, where the record's own was used instead.
     line : Frequency found in the record.
+    delays : By how much channels come behind the motion, beyond what is stated.
     """
 
     run_id: str
@@ -116,6 +58,7 @@ class Reduced:
     samples: int = 0
     stated_hz: float | None = None
     line: Line | None = None
+    delays: tuple[delay.Delay, ...] = ()
 
     @property
     def runs(self) -> list[str]:
@@ -126,10 +69,12 @@ class Reduced:
         """The reduction in one line, as the run table carries it."""
         cut = f"{reduction.TRANSIENT} cut to" if self.fit.cut else "window"
         fewest = self.fit.effective.min() if self.fit.effective.size else math.nan
+        # A channel that has settled to its last digits has no scatter to count samples of.
+        amount = "settled" if self.fit.converged and fewest < 1.0 else f"{fewest:.0f} effective samples"
         more = "".join(f"; {text}" for text in self.remarks())
         return (
-            f"{self.kind}, {cut} {self.fit.start:g}-{self.fit.end:g} s, s.e. {reduction.ERROR}, "
-            f"{fewest:.0f} effective samples, {self.fit.verdict}{more}"
+            f"{self.kind}, {cut} {self.fit.start:.10g}-{self.fit.end:.10g} s, s.e. {reduction.ERROR}, "
+            f"{amount}, {self.fit.verdict}{more}"
         )
 
     def remarks(self) -> list[str]:
@@ -142,46 +87,6 @@ class Reduced:
                 f"{self.line.stderr:.1g} Hz, which is used"
             )
         return texts
-
-
-Timed = Iterator[tuple[Array, Array, NDArray[np.bool_]]]
-
-
-def _timed(channels: Channels, rule: Reduction, clock: Clock | None = None) -> Iterator[tuple[Array, Array]]:
-    """Pieces as (time, other channels) within the window, time rising; stamps are fed to ``clock``."""
-    at = channels.quantities.index("time") if "time" in channels.quantities else None
-    others = [i for i, q in enumerate(channels.quantities) if q != "time"]
-    count, last = 0, -math.inf
-    for piece in channels.pieces():
-        if clock is not None and at is not None:
-            clock.feed(piece[:, at])
-        if rule.rate_hz is not None:
-            time = (count + np.arange(len(piece))) / rule.rate_hz
-        else:
-            time = piece[:, at]
-        step = np.diff(time, prepend=last)
-        if (step <= 0.0).any():
-            i = int(np.flatnonzero(step <= 0.0)[0])
-            whole = _whole(channels, at)
-            faults = whole.repeats + whole.backs
-            more = f"; {faults} of {whole.samples} stamps repeat or step back" if faults > 1 else ""
-            raise NotRising(channels, whole, count + i, f"{time[i]:g} s after {time[i - 1] if i else last:g} s{more}")
-        count, last = count + len(piece), float(time[-1])
-        keep = np.ones(len(time), dtype=bool)
-        if rule.start_s is not None:
-            keep &= time >= rule.start_s
-        if rule.end_s is not None:
-            keep &= time <= rule.end_s
-        if keep.any():
-            yield time[keep], piece[keep][:, others]
-
-
-def _whole(channels: Channels, at: int | None) -> Clock:
-    """All stamps of a history."""
-    clock = Clock()
-    for piece in channels.pieces() if at is not None else ():
-        clock.feed(piece[:, at])
-    return clock
 
 
 def reduce(channels: Channels, rule: Reduction, run_id: str, frequency: float | None) -> tuple[dict[str, Any], Reduced]:
@@ -215,9 +120,9 @@ def reduce(channels: Channels, rule: Reduction, run_id: str, frequency: float | 
     sound, faults = _sound(channels, rule, names)
     line, stated = None, None
     if rule.kind == "oscillatory":
-        line = _line(sound(None), names, frequency, channels)
-        frequency, stated = _frequency(line, frequency, names, rule, channels)
-        _phase_is_known(channels, rule, names)
+        line = line_of(sound(None), names, frequency, channels)
+        frequency, stated = frequency_of(line, frequency, names, rule, channels)
+        phase_is_known(channels, rule, names)
     regressors, span = _regressors(channels, rule, frequency, sound)
     clock = Clock() if "time" in channels.quantities else None
     faults.counts.clear()
@@ -238,7 +143,11 @@ def reduce(channels: Channels, rule: Reduction, run_id: str, frequency: float | 
         line=line,
     )
     if rule.kind == "oscillatory":
-        return _harmonic_values(names, fit, frequency or 0.0, rule.delay_s), reduced
+        found, delays = _harmonic_values(names, fit, frequency or 0.0, rule)
+        whole = condense.condense(_moved(sound(None), channels, names, rule, frequency), condense.constant, len(names))
+        weight, time, _, samples = whole.blocks()
+        seen = delay.of_loads(time, samples, weight, names, frequency or 0.0, rule.delay_s)
+        return found, replace(reduced, delays=(*delays, *((seen,) if seen else ())))
     values: dict[str, Any] = {}
     for c, name in enumerate(names):
         values[name] = float(fit.values[0, c])
@@ -252,60 +161,8 @@ def reduce(channels: Channels, rule: Reduction, run_id: str, frequency: float | 
 def _sound(channels: Channels, rule: Reduction, names: list[str]) -> tuple[Callable[[Clock | None], Timed], Usual]:
     """The history with the samples marked that are no measurements, and what its channels are like."""
     missing = [channels.missing.get(name, ()) for name in names]
-    found = usual((values for _, values in _timed(channels, rule)), names, missing)
-    return (lambda clock: found.faults(_timed(channels, rule, clock))), found
-
-
-def _line(pieces: Timed, names: list[str], frequency: float | None, channels: Channels) -> Line | None:
-    """The oscillation of the displacement, or else of the loads."""
-    condensed = condense.condense(pieces, condense.constant, len(names))
-    weight, time, _, values = condensed.blocks()
-    chosen = (
-        [names.index("displacement")]
-        if "displacement" in names
-        else [c for c, name in enumerate(names) if name in OUTPUTS]
-    )
-    if frequency is None and "displacement" not in names:
-        raise InputError(str(channels.path), "no frequency", "frequency_hz in [source.reduction], or frequency")
-    found = estimate(time, values[:, chosen], weight, frequency) if time.size else None
-    return None if found is None else replace(found, channel=chosen[found.channel])
-
-
-def _frequency(
-    line: Line | None, stated: float | None, names: list[str], rule: Reduction, channels: Channels
-) -> tuple[float, float | None]:
-    """The frequency to use, and the stated one where the record says another."""
-    if stated is None or not stated > 0.0:
-        if line is None:
-            text = "frequency_hz in [source.reduction], or frequency; the displacement holds no clear oscillation"
-            raise InputError(str(channels.path), "no frequency", text)
-        return line.frequency, None
-    if line is None:
-        return stated, None
-    off = abs(line.frequency - stated)
-    if off > _OFF * stated:
-        found = f"frequency_hz = {stated:g}, and {names[line.channel]} oscillates at {line.frequency:.5g} Hz"
-        raise InputError(str(channels.path), found, f"the frequency of the motion, to {100 * _OFF:g} %")
-    drift = off * _span(channels, rule)
-    return (line.frequency, stated) if off > _SURE * line.stderr and drift > _DRIFT else (stated, None)
-
-
-def _span(channels: Channels, rule: Reduction) -> float:
-    first, last = math.inf, -math.inf
-    for time, _ in _timed(channels, rule):
-        first, last = min(first, float(time[0])), float(time[-1])
-    return last - first
-
-
-def _phase_is_known(channels: Channels, rule: Reduction, names: list[str]) -> None:
-    """A phase that is not stated is that of a clock that starts at zero, or a channel's."""
-    if "displacement" in names or "phase_deg" in rule.model_fields_set or rule.rate_hz is not None:
-        return
-    time = next((time for time, _ in _timed(channels, rule.model_copy(update={"start_s": None}))), np.zeros(0))
-    if time.size > 1 and abs(time[0]) > _LATE * abs(time[1] - time[0]):
-        text = "phase_deg in [source.reduction]: that of the displacement at time zero of this clock "
-        text += "(phase_deg = 0.0 where it is zero), or a column displacement"
-        raise InputError(str(channels.path), f"a clock that starts at {time[0]:g} s, and no phase", text)
+    found = usual((values for _, values in timed(channels, rule)), names, missing)
+    return (lambda clock: found.faults(timed(channels, rule, clock))), found
 
 
 def _moved(pieces: Timed, channels: Channels, names: list[str], rule: Reduction, frequency: float | None) -> Timed:
@@ -343,16 +200,17 @@ def _regressors(
 
 
 def _harmonic_values(
-    names: list[str], fit: reduction.Fitted, frequency: float, delay_s: dict[str, float]
-) -> dict[str, Any]:
+    names: list[str], fit: reduction.Fitted, frequency: float, rule: Reduction
+) -> tuple[dict[str, Any], list[delay.Delay]]:
     """Harmonics in the phase of the displacement, which a channel may measure, each channel's delay taken off."""
     shift, values = 0.0, {}
+    delay_s, motion = rule.delay_s, rule.motion or ""
     omega = 2.0 * math.pi * frequency
     if "displacement" in names:
         s, c = fit.values[1:3, names.index("displacement")]
         shift = math.atan2(c, s) + omega * delay_s.get("displacement", 0.0)
         values["amplitude"] = math.hypot(s, c)
-    covariance = {}
+    covariance, delays = {}, []
     for c_, name in enumerate(names):
         # What comes late by a delay stands a phase of omega times it behind.
         late = omega * delay_s.get(name.removeprefix(TAKEN), 0.0)
@@ -365,106 +223,11 @@ def _harmonic_values(
         if name.removeprefix(TAKEN) in OUTPUTS:
             values |= {f"{name}_{h}": float(v) for h, v in zip(HARMONICS, own, strict=True)}
             covariance[name] = turn @ fit.covariance[c_] @ turn.T
+        elif name in MOTIONS[motion]:
+            # A measured rate or acceleration swings with the motion: its amplitude is meant, not its mean.
+            seen = delay.of_rate(name, motion, own, turn @ fit.covariance[c_] @ turn.T, frequency)
+            delays += [seen] if seen else []
+            values[name] = math.hypot(own[1], own[2]) * (1.0 if name == MOTIONS[motion][0] else -1.0)
         elif name != "displacement":
             values[name] = float(own[0])
-    return values | {"covariance": covariance, "frequency": frequency}
-
-
-def phase_row(theta: float) -> Array:
-    """Weights of mean, in, out, in2, out2, in3, out3 in the load at phase ``theta``.
-
-    The third harmonic in phase is left out: a load that is a function of the velocity and
-    linear in the acceleration has none, so at the ends of the acceleration it is noise.
-    """
-    row = np.array([1.0, *(f(k * theta) for k in (1, 2, 3) for f in (math.sin, math.cos))])
-    row[HARMONICS.index("in3")] = 0.0
-    return row
-
-
-def states(run: dict[str, Any], rule: Reduction, frame: Frame, ittc: bool, where: str) -> list[dict[str, Any]]:
-    """Four instants of an oscillatory test, each a run of its own.
-
-    The displacement is A sin(theta); the velocity A w cos(theta) is largest at 0 and pi,
-    the acceleration -A w^2 sin(theta) at pi/2 and 3 pi/2. The load there is the sum of its
-    harmonics 0-3 (in phase: of sine, in quadrature: of cosine).
-
-    Parameters
-    ----------
-    run : Base state (SI, campaign frame), ``X_mean``, ``X_in``, ..., ``frequency`` [Hz], and
-        one of ``amplitude`` or the acceleration's amplitude (-A w^2, signed).
-    rule : Says what oscillates.
-    frame, ittc : Of the campaign: direction of the axis that moves, sign of drift.
-    where : For the error.
-
-    Raises
-    ------
-    InputError
-        Without frequency, amplitude, or any load.
-    """
-    assert rule.motion is not None
-    speed_name, acceleration_name = MOTIONS[rule.motion]
-    omega = 2.0 * math.pi * float(run.get("frequency", rule.frequency_hz) or math.nan)
-    if not omega > 0.0:
-        raise InputError(f"{where}, column frequency", "nothing", "a frequency, or frequency_hz in [source.reduction]")
-    speed, given = _amplitudes(run, rule, omega, where)
-    found = []
-    for name, theta in PHASES.items():
-        state = {k: v for k, v in run.items() if "_" not in k or k.split("_")[-1] not in HARMONICS}
-        state["run_id"] = f"{run['run_id']}{name}"
-        at_velocity = name.endswith("v")
-        _move(state, speed_name, speed * math.cos(theta) if at_velocity else 0.0, frame, ittc)
-        state[acceleration_name] = 0.0 if at_velocity else given * math.sin(theta)
-        usual = _STEADY_TEST.get(rule.motion, "rotating_arm")
-        state["test"] = (run.get("test") or usual) if at_velocity else "acceleration"
-        weights = phase_row(theta)
-        for output in (*OUTPUTS, *(TAKEN + o for o in OUTPUTS)):
-            parts = np.array([run.get(f"{output}_{h}", math.nan) for h in HARMONICS], dtype=float)
-            if np.isnan(parts).all():
-                continue
-            state[output] = float(weights @ np.nan_to_num(parts))
-            if output in OUTPUTS and output in run.get("covariance", {}):
-                variance = float(weights @ run["covariance"][output] @ weights)
-                state[f"s_{output}"] = math.sqrt(max(variance, 0.0))
-        for name_ in ("covariance", "frequency", "amplitude", "displacement"):
-            state.pop(name_, None)
-        found.append(state)
-    return found
-
-
-def _amplitudes(run: dict[str, Any], rule: Reduction, omega: float, where: str) -> tuple[float, float]:
-    """Amplitudes of velocity (of cosine) and acceleration (of sine), from what the run gives."""
-    speed_name, acceleration_name = MOTIONS[rule.motion or "sway"]
-    amplitude = run.get("amplitude", rule.amplitude)
-    given = {k: run.get(k) for k in (speed_name, acceleration_name)}
-    known = {k: float(v) for k, v in given.items() if v is not None and not math.isnan(v)}
-    if acceleration_name in known:
-        speed = -known[acceleration_name] / omega
-    elif speed_name in known:
-        speed = known[speed_name]
-    elif amplitude is not None and not math.isnan(amplitude):
-        speed = float(amplitude) * omega
-    else:
-        text = f"amplitude in [source.reduction], a column displacement, or the amplitude {acceleration_name}"
-        raise InputError(f"{where}, column displacement", "nothing", text)
-    off = abs(speed - known.get(speed_name, speed))
-    if off > _AGREE * abs(speed):
-        found = f"amplitudes {speed_name} = {known[speed_name]:g} and {acceleration_name} = {-speed * omega:g}"
-        text = f"{acceleration_name} = -{speed_name} omega with omega = {omega:g} rad/s (displacement A sin)"
-        raise InputError(where, found, text)
-    return speed, -speed * omega
-
-
-def _move(state: dict[str, Any], name: str, velocity: float, frame: Frame, ittc: bool) -> None:
-    """Put the velocity of the oscillation into a state: a rate, or added to the flow."""
-    if name in "pqr":
-        state[name] = velocity
-        return
-    sign = -1.0 if ittc else 1.0
-    speed, alpha, beta = (float(np.nan_to_num(state.get(k, 0.0) or 0.0)) for k in ("U", "alpha", "beta"))
-    moving = np.array(body_velocity(speed, alpha, sign * beta))
-    moving["uvw".index(name)] += frame.sign(name) * velocity
-    size = float(np.linalg.norm(moving))
-    state["U"] = size
-    if size > 0.0:
-        state["alpha"] = math.atan2(moving[2], moving[0]) if moving[0] or moving[2] else 0.0
-        state["beta"] = sign * math.asin(max(-1.0, min(1.0, moving[1] / size)))
+    return values | {"covariance": covariance, "frequency": frequency}, delays

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from ident.captive.axes import GROUPS, from_flow, turned_by
 from ident.captive.campaign_file import CampaignFile
-from ident.captive.histories import Moving
+from ident.captive.channels import Moving
 from ident.captive.source import MOTIONS, Source
 from sim.boat.catalogue import OUTPUTS
 from sim.files.errors import InputError

@@ -45,12 +45,18 @@ _POWER = re.compile(
 # A unit after a slash or a comma, as DIN 1313 and some loggers write it: F_y / kN; Fy, kN.
 _AFTER = re.compile(r"^(?P<name>.*\S)(?:\s+/\s+|\s*,\s+)(?P<unit>\S.*)$")
 _ANGLES = {"radian", "degree", "turn", "grade", "arcminute", "arcsecond", "milliradian"}
-# Coefficients that are printed times ten, and headers that say so: 10KQ, 10 Kq, X' x1000, CT*10^3.
+# Coefficients that are printed times ten, and headers that say so: 10KQ, 10 Kq [-], KQ x 10; and primes, Y' x1000,
+# N' (*10^3). In front of or behind a dimensionless symbol, what is printed is the multiple.
 _BARE = ("KT", "KQ", "J", "t")
-_MULTIPLE = re.compile(r"(?P<times>10{1,6})\s*[*·]?\s*(?P<name>[A-Za-z]+)")
+_TENS = (
+    r"1(?P<zeros>0{1,6})|10\s*(?:\^|\*\*)\s*(?P<power>[1-6])|10(?P<raised>[\u00b9\u00b2\u00b3\u2074-\u2076])"
+    r"|1[eE]\+?(?P<e>[1-6])"
+)
+_BEFORE = re.compile(rf"(?:{_TENS})\s*[*\u00b7x\u00d7]?\s*(?P<name>[A-Za-z]+'?)\s*(?:\[-?\]|\(-?\))?")
+_BEHIND = re.compile(rf"(?P<name>[A-Za-z]+'?)\s*(?:\[-?\]|\(-?\))?\s*\(?\s*[*\u00b7x\u00d7]\s*(?:{_TENS})\s*\)?")
 _TIMES = re.compile(
-    r"(?i)(^|\s|\()1(0{1,6}|e[+-]?\d)\s*[*·x]?\s*[a-z]{1,2}(?![a-z])"
-    r"|[x×*·]\s*(10{1,6}|10\s*(\^|\*\*|e)\s*[-+]?\d+|1e[+-]?\d+)\b"
+    r"(?i)(^|\s|\()1(0{1,6}|e[+-]?\d)\s*[*\u00b7x]?\s*[a-z]{1,2}(?![a-z])"
+    r"|[x\u00d7*\u00b7]\s*(10{1,6}|10\s*(\^|\*\*|e)\s*[-+]?\d+|1e[+-]?\d+)\b"
 )
 # Names of other papers and laboratories -> the quantity that is meant, for the message.
 _MEANT = {
@@ -290,6 +296,27 @@ def is_unit(text: str) -> bool:
         return False
 
 
+def _multiple(header: str, declared: str | None) -> Column | None:
+    """A dimensionless column whose header says by what its numbers are multiplied; None for others.
+
+    ``10KQ`` holds ten times KQ, ``Y' x1000`` a thousand times Y'. A load with a unit may mean either, and is not read.
+    """
+    times = _BEFORE.fullmatch(header) or _BEHIND.fullmatch(header)
+    if times is None:
+        return None
+    ten = times["zeros"] and len(times["zeros"])
+    ten = ten or times["power"] or times["e"] or str(times["raised"]).translate(_RAISED)
+    name, unit = split(declared) if declared is not None else (times["name"], None)
+    name = {"kt": "KT", "kq": "KQ"}.get(name.lower(), name)
+    bare = name.removesuffix("'")
+    primed = name.endswith("'") or times["name"].endswith("'") or unit == "-"
+    if owner(bare) in _BARE and owner(bare) == bare and unit in (None, *_NO_UNIT):
+        return Column(header, bare, 10.0 ** -int(ten))
+    if owner(bare) in PRIMED and owner(bare) == bare and primed and unit in (None, *_NO_UNIT):
+        return Column(header, bare, 10.0 ** -int(ten), primed=True)
+    return None
+
+
 def column(header: str, declared: str | None, where: str, factored: bool = False) -> Column:
     """What a column is, from its header and what the campaign declares it to be.
 
@@ -309,9 +336,8 @@ def column(header: str, declared: str | None, where: str, factored: bool = False
     if declared is None and header in suffixed():
         return Column(header, *suffixed()[header])
     place = f"{where}, column {header[:60]!r}"
-    if declared is None and (times := _MULTIPLE.fullmatch(header)) and owner(times["name"]) in _BARE:
-        # A header 10KQ holds ten times KQ.
-        return Column(header, times["name"], 1.0 / float(times["times"]))
+    if not factored and (multiple := _multiple(header, declared)) is not None:
+        return multiple
     if _TIMES.search(header) and not factored:
         text = "a factor in [source.factor]: what a value is multiplied by to give the quantity"
         raise InputError(place, "a header that names a multiple", text)

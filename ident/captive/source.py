@@ -24,6 +24,7 @@ Reader = Literal[
     "fluent",
     "su2",
     "tecplot",
+    "universal",
 ]
 READERS = get_args(Reader)
 # Motion of an oscillatory test -> velocity and acceleration it makes.
@@ -53,6 +54,7 @@ LOOKED_AT = {
     "fluent": (*_COLUMN_KEYS, *_TEXT_KEYS),
     "su2": (*_COLUMN_KEYS, *_TEXT_KEYS),
     "tecplot": (*_COLUMN_KEYS, "table", "encoding", "skip"),
+    "universal": _COLUMN_KEYS,
     "openfoam": _FOAM_KEYS,
 }
 NO_COLUMNS = "no subtract: a function object of the patches that are wanted, OpenFOAM's files have no other columns"
@@ -183,6 +185,9 @@ class Source(Data):
     factor : Header or quantity -> what its values are multiplied by, where the header does not say it.
     missing : Numbers that stand for a value that was not measured.
     words : Words of the files -> those of this program.
+    plus_minus : How many standard errors an error behind a plus-minus sign is: 1.96 for 95 % limits. Without
+        it they are read as one, and ``ident check`` says so.
+    marks : Footnote mark behind a number -> quality word of its run: ``"*" = "poor"``.
     reference : What dimensionless columns were made with.
     reduction : How a time history becomes runs.
     subtract : Measured loads of parts that are taken off.
@@ -217,6 +222,10 @@ class Source(Data):
     factor: dict[str, Annotated[float, Field(ge=-1e9, le=1e9)]] = Field(default_factory=dict)
     missing: Annotated[list[float], Field(max_length=20)] = Field(default_factory=list)
     words: dict[str, str] = Field(default_factory=dict)
+    plus_minus: Annotated[float, Field(gt=0, le=10)] | None = None
+    marks: Annotated[dict[Annotated[str, Field(min_length=1, max_length=5)], str], Field(max_length=20)] = Field(
+        default_factory=dict
+    )
     reference: Reference | None = None
     reduction: Reduction | None = None
     subtract: list[Subtract] = Field(default_factory=list)
@@ -264,6 +273,9 @@ class Source(Data):
             for key in ("start_s", "end_s", "rate_hz", "phase_deg", "delay_s"):
                 if key in self.reduction.model_fields_set:
                     raise ValueError(f"no reduction.{key} with rows = 'runs': there is no time in a table of harmonics")
+        for key in ("plus_minus", "marks"):
+            if self.rows == "history" and key in self.model_fields_set:
+                raise ValueError(f"no {key} with rows = 'history': samples have no errors or marks behind them")
         if self.moments_about and (self.reduction is None or self.reduction.kind != "oscillatory"):
             raise ValueError("no moments_about: only in an oscillation does a body move away from a fixed moment point")
         if self.reference is not None and self.normalisation != "half_rho_A":

@@ -31,6 +31,7 @@ class Uses:
     Attributes
     ----------
     primed : Quantities that were dimensionless.
+    beside : What stood in cells beside numbers and was used: ``plus_minus``, ``marks.*``.
     """
 
     def __init__(self, source: Source, where: str) -> None:
@@ -39,6 +40,7 @@ class Uses:
         self._ignored: set[str] = set()
         self._factors: set[str] = set()
         self._words: set[str] = set()
+        self.beside: set[str] = set()
 
     def whole(self) -> None:
         """All factors are checked where the file is read."""
@@ -78,6 +80,12 @@ class Uses:
             for name in given:
                 if name not in used:
                     raise InputError(f"{self.where}, key source.{key}", f"{name[:60]!r}, and {reason}", "what is there")
+        if source.plus_minus is not None and "plus_minus" not in self.beside:
+            raise InputError(f"{self.where}, key source.plus_minus", "declared, and no cell has such a sign", "nothing")
+        for mark in source.marks:
+            if f"marks.{mark}" not in self.beside:
+                found = f"{mark!r}, and no number has it behind"
+                raise InputError(f"{self.where}, key source.marks", found, "marks that are there")
         if source.normalisation and not self.primed:
             text = "nothing: every column of the files has a unit, so nothing is made dimensional"
             raise InputError(f"{self.where}, key source.normalisation", repr(source.normalisation), text)

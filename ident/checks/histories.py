@@ -134,3 +134,17 @@ def another_frequency(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
             what = f"run {one.run_id}: {one.stated_hz:g} Hz stated, {name} oscillates at {one.line.frequency:.6g} +- "
             what += f"{one.line.stderr:.1g} Hz, which was used"
             yield rule.finding(one.file, [], [name], what)
+
+
+@check("delay")
+def behind_the_motion(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
+    """Loads and measured rates that come behind the displacement by more than is stated."""
+    for one in evidence.histories:
+        cycle = one.line.frequency if one.line is not None else 0.0
+        for late in one.delays:
+            least = max(rule.limits["errors"] * late.stderr, rule.limits["cycle"] / max(cycle, 1e-9))
+            if abs(late.seconds) > least:
+                side = "behind" if late.seconds > 0.0 else "ahead of"
+                size = f"{abs(late.seconds):.3g} +- {late.stderr:.1g} s"
+                what = f"run {one.run_id}: {late.what} {size} {side} the displacement"
+                yield rule.finding(one.file, [], late.what.removeprefix("the loads ").split(), what)

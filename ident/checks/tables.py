@@ -276,3 +276,20 @@ def unsupported_terms(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
         for test, symbols in groups.items():
             what = f"{test}: {text} {', '.join(symbols)} ({len(symbols)} terms of set {campaign.vehicle.term_set})"
             yield rule.finding("campaign.toml", [], [], what, severity)
+
+
+@check("notes")
+def signs_behind_numbers(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
+    """Errors and footnote marks behind numbers whose meaning the campaign does not state; one finding a file."""
+    runs = evidence.runs
+    if "notes" not in runs:
+        return
+    noted = runs[runs["notes"].fillna("") != ""]
+    for file, own in noted.groupby("file", sort=False):
+        every = [note for text in own["notes"] for note in text.split("; ")]
+        signs = [n for n in every if n.endswith("+-")]
+        marks = dict.fromkeys(n.split(": ")[1] for n in every if not n.endswith("+-"))
+        words = [f"{len(signs)} errors behind numbers, read as one standard error each"] if signs else []
+        words += [f"footnote marks {' '.join(marks)} behind {len(every) - len(signs)} numbers"] if marks else []
+        columns = list(dict.fromkeys(n.split(": ")[0] for n in every))
+        yield rule.finding(str(file), own["row"], columns, "; ".join(words))

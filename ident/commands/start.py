@@ -30,7 +30,7 @@ def new(folder: Path, json_path: str | None) -> None:
 
 
 @click.command()
-@click.argument("kind", type=click.Choice(["vehicle", "campaign", "case", "calibration"]))
+@click.argument("kind", type=click.Choice(["vehicle", "campaign", "case", "calibration", "trial"]))
 @json_to("Write the schema to a file; it is printed without.")
 def schema(kind: str, json_path: str | None) -> None:
     """Print the JSON schema of a kind of file, for editors: every key, what it takes and means.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 from ident.captive.campaign import Campaign
@@ -9,6 +10,7 @@ from ident.captive.conversions import tare_applies
 from ident.captive.run_table import MOTION
 from ident.timeseries.reduction import ERROR, TRANSIENT
 from sim.boat.catalogue import OUTPUTS
+from sim.boat.vehicle import Vehicle
 from sim.files.frames import PROGRAM, SENSES
 
 _TURNED = (*OUTPUTS, *MOTION)
@@ -20,6 +22,8 @@ _STATED = (
     "factor",
     "missing",
     "words",
+    "plus_minus",
+    "marks",
     "reference",
     "cofr",
     "vehicle_origin",
@@ -37,7 +41,7 @@ def conversions(campaign: Campaign) -> dict[str, Any]:
 
     Returns
     -------
-    JSON content, keys in the order of ``ident.captive.conversions``: ``sources`` and ``histories``
+    JSON content, keys in the order of ``ident.captive.conversions``: ``vehicle``, ``sources`` and ``histories``
     (reduction), ``tare``, ``frame``, ``moment_point``, ``inertia``, ``half_model``, ``scale``,
     ``fluid``, ``uncertainty``; as in ``campaign.toml``, model scale and campaign frame, with
     how many runs each concerns and which components changed sign.
@@ -55,6 +59,7 @@ def conversions(campaign: Campaign) -> dict[str, Any]:
     if header.inertia.model_inertia_in_loads:
         inertia |= {"runs": int(runs["part"].isin(header.inertia.parts).sum())}
     return {
+        "vehicle": vehicle_stated(campaign.vehicle),
         "sources": [
             {k: one[k] for k in ("files", "rows", "normalisation", "rho_inf", "reduction", "subtract")}
             | {k: one[k] for k in _STATED if one[k]}
@@ -73,10 +78,22 @@ def conversions(campaign: Campaign) -> dict[str, Any]:
         "inertia": inertia,
         "half_model": data["half_model"],
         **({"hydrostatics": data["hydrostatics"]} if data["hydrostatics"] else {}),
+        **({"absent": data["absent"]} if data["absent"] else {}),
         "scale": data["scale"],
         "fluid": data["fluid"],
         "uncertainty": data["uncertainty"],
     }
+
+
+def vehicle_stated(vehicle: Vehicle) -> dict[str, Any]:
+    """The vehicle file that a version was made with, in the program frame; of files beside it, their names.
+
+    Parameters
+    ----------
+    vehicle : As read.
+    """
+    data = vehicle.model_dump(mode="json", exclude_none=True)
+    return data | {k: Path(data[k]).name for k in ("geometry", "errata", "terms") if k in data}
 
 
 def _of_members(campaign: Campaign) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""Keys of vehicle, campaign, case and calibration files: ``ident schema`` and the page of the documentation."""
+"""Keys of vehicle, campaign, case, calibration and trial files: ``ident schema`` and the page of the documentation."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from pydantic_core import PydanticUndefined
 
 from ident.calibration.file import CalibrationFile
 from ident.captive.campaign_file import CampaignFile
+from ident.trials.spec import TrialFile
 from sim.boat.vehicle import Vehicle
 from sim.files.errors import InputError
 from sim.flight.case import Case
@@ -20,6 +21,7 @@ KINDS: dict[str, type[BaseModel]] = {
     "campaign": CampaignFile,
     "case": Case,
     "calibration": CalibrationFile,
+    "trial": TrialFile,
 }
 _DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
@@ -76,7 +78,7 @@ def schema(kind: str) -> dict[str, Any]:
 
     Parameters
     ----------
-    kind : ``vehicle``, ``campaign``, ``case`` or ``calibration``.
+    kind : ``vehicle``, ``campaign``, ``case``, ``calibration`` or ``trial``.
 
     Returns
     -------

@@ -45,6 +45,8 @@ _BEYOND = 3.0
 # Clipped: the extreme value stands so many times, and so many times as often as the next.
 _CLIPPED = 10
 _OFTEN = 5.0
+# A limit that is so far from the next value, as a share of 98 % of the record, cuts nothing off.
+_APART = 0.2
 _NINES = re.compile(r"9{3,}0*")
 
 
@@ -91,6 +93,9 @@ class _Channel:
     longest: int = 1 << 60
     sentinels: tuple[float, ...] = ()
     clipped: str = ""
+    # How often the limit stands, and whether far from all other values: a dropout, nothing is cut off there.
+    at_limit: int = 0
+    apart: bool = False
 
 
 @dataclass
@@ -109,8 +114,12 @@ class Usual:
 
     @property
     def clipped(self) -> dict[str, str]:
-        """Channel -> how it is clipped, in words."""
-        return {n: c.clipped for n, c in zip(self.names, self._channels, strict=True) if c.clipped}
+        """Channel -> how it is clipped, in words; after ``faults``, without what was left out whole as stuck."""
+        return {
+            n: c.clipped
+            for n, c in zip(self.names, self._channels, strict=True)
+            if c.clipped and not (c.apart and self.counts["stuck", n] >= c.at_limit)
+        }
 
     def faults(self, pieces: Iterator[tuple[Array, Array]]) -> Iterator[tuple[Array, Array, NDArray[np.bool_]]]:
         """Pieces (any columns, channels) with a mask of the samples to leave out, counted as they pass."""
@@ -224,6 +233,7 @@ class _Learning:
         for end, word in zip(self.ends, ("largest", "smallest"), strict=True):
             value = end.sign * end.first
             if end.clipped() and value not in channel.sentinels and channel.low <= value <= channel.high:
+                channel.at_limit, channel.apart = end.firsts, end.first - end.second > _APART * (high - low)
                 channel.clipped = f"{end.firsts} of {self.count} samples are the {word} value {value:g}"
         return channel
 

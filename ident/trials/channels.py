@@ -73,12 +73,15 @@ def _split(header: str) -> tuple[str, str | None]:
     name, unit = split(header)
     if unit is not None:
         return name, unit
+    if (slashed := re.fullmatch(r"(.*\S)\s+/\s+\((.+)\)", header.strip())) is not None:
+        # A unit that is a quotient, after a slash: r / (deg/s).
+        return slashed[1], slashed[2]
     if channel_of(header):
         return header, _NAMED_UNIT.get(plain(header).split()[-1])
-    found = re.fullmatch(r"(.*\S)\s*[\s_/,]\s*(\S+)", header.strip())
-    if found:
-        channel = channel_of(found[1].rstrip(" _/,"))
-        if channel and unit_factor(channel, found[2]) is not None:
+    for parts in (r"(.*\S)\s*[\s_/,]\s*(\S+)", r"([^_]+)_(\S+)"):
+        found = re.fullmatch(parts, header.strip())
+        channel = channel_of(found[1].rstrip(" _/,")) if found else ""
+        if found and channel and unit_factor(channel, found[2]) is not None:
             return found[1].rstrip(" _/,"), found[2]
     return header, None
 

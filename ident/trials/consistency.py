@@ -4,10 +4,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
+from ident.captive.quantities import factor
 from ident.checks.findings import Finding
 from ident.timeseries.smoothing import Samples, SmoothPath, smooth
 from ident.trials.earth import drift
@@ -20,18 +24,6 @@ Array = NDArray[np.float64]
 RATES = {"r": "psi", "p": "phi", "q": "theta", "udot": "u"}
 _NAMES = {"r": "yaw rate", "p": "roll rate", "q": "pitch rate", "udot": "surge acceleration", "psi": "heading"}
 _NAMES |= {"phi": "heel", "theta": "pitch", "u": "speed ahead", "U": "speed"}
-# Factors by which a channel is off when its unit is another than the header says.
-_FACTORS = {
-    57.29578: "degrees and radians",
-    60.0: "minutes and seconds",
-    1.943844: "knots and m/s",
-    3.6: "km/h and m/s",
-    3.280840: "feet and metres",
-    1.852: "knots and km/h",
-    3437.747: "deg/min and rad/s",
-    9.80665: "g and m/s2",
-    1000.0: "thousandths",
-}
 _SAME, _LIKE, _ALIKE = 0.1, 0.06, 0.9
 _MOST_DRIFT = math.radians(40.0)
 # Heading and track of a boat turn by angles that differ by less than this factor.
@@ -53,14 +45,26 @@ class Pair:
         return self.correlation > _ALIKE and abs(self.slope - 1.0) < _SAME
 
 
+@cache
+def unit_slips() -> dict[str, float]:
+    """Pairs of units that are taken for one another -> their ratio, above one; from ``data/unit_slips.csv``."""
+    with (files("ident") / "data" / "unit_slips.csv").open(encoding="utf-8") as stream:
+        rows = pd.read_csv(stream)
+    found = {}
+    for like, unit, instead, words in zip(rows["like"], rows["unit"], rows["instead"], rows["words"], strict=True):
+        sizes = [factor(like, one) for one in (unit, instead)]
+        assert sizes[0] is not None, words
+        assert sizes[1] is not None, words
+        found[words] = sizes[0] / sizes[1]
+    return found
+
+
 def factor_between(ratio: float) -> tuple[float, str] | None:
     """The unit slip that a ratio of two channels shows, and its factor; None for none."""
     size = abs(ratio)
-    for value, words in _FACTORS.items():
-        for one in (value, 1.0 / value):
-            if abs(size / one - 1.0) < _LIKE:
-                return one, words
-    return None
+    every = [(one, words) for words, value in unit_slips().items() for one in (value, 1.0 / value)]
+    one, words = min(every, key=lambda item: abs(math.log(max(size, 1e-300) / item[0])))
+    return (one, words) if abs(size / one - 1.0) < _LIKE else None
 
 
 def regressed(time: Array, value: Array, like: Array) -> Pair | None:
@@ -79,9 +83,10 @@ def path_of(record: Record) -> SmoothPath:
     return smooth([Samples(record.abscissa, record.value, 0, 0.0)])
 
 
-def _finding(
+def finding_of(
     one: Recording, check: str, columns: tuple[str, ...], at: float, what: str, remedy: str, severity: str = "error"
 ) -> Finding:
+    """A finding at a time of a record, with the headers of its channels."""
     headers = tuple(one.headers.get(c, c) for c in columns)
     return Finding(check, severity, one.file, (one.row_at(at),), headers, what, remedy)
 
@@ -122,7 +127,7 @@ def _of_rate(one: Recording, name: str, pairs: dict[str, Pair]) -> list[Finding]
             f"(correlation {pair.correlation:.3f}, slope {pair.slope:.3g}): channels exchanged"
         )
         remedy = f'trial.toml: [channels] "{header}" = "{right} [UNIT]", or mend the file'
-        return [_finding(one, "exchanged_channels", (name, angle), pair.worst, what, remedy)]
+        return [finding_of(one, "exchanged_channels", (name, angle), pair.worst, what, remedy)]
     if own is None or own.agrees:
         return []
     words = f"{header} against the rate of {one.headers[RATES[name]]}: "
@@ -131,14 +136,14 @@ def _of_rate(one: Recording, name: str, pairs: dict[str, Pair]) -> list[Finding]
     if slip:
         remedy = f'state the right unit in trial.toml: [channels] "{header}" = "{name} [UNIT]"'
         return [
-            _finding(
+            finding_of(
                 one, "unit_slip", (name, RATES[name]), own.worst, f"{words}: off by {slip[0]:.4g}, {slip[1]}", remedy
             )
         ]
     if own.correlation < -_ALIKE:
         remedy = "state the frame of the record in trial.toml: [frame], or mend the sign of one of the two"
         return [
-            _finding(
+            finding_of(
                 one, "sign_of_a_rate", (name, RATES[name]), own.worst, f"{words}: they turn against one another", remedy
             )
         ]
@@ -146,7 +151,7 @@ def _of_rate(one: Recording, name: str, pairs: dict[str, Pair]) -> list[Finding]
         # A noisy rate of the right size: nothing is wrong with it but the noise.
         return []
     remedy = "the rate is not used; look at its unit, its zero and its filter"
-    return [_finding(one, "rate_against_angle", (name, RATES[name]), own.worst, words, remedy, "warning")]
+    return [finding_of(one, "rate_against_angle", (name, RATES[name]), own.worst, words, remedy, "warning")]
 
 
 def _track(one: Recording) -> list[Finding]:
@@ -175,7 +180,7 @@ def _track(one: Recording) -> list[Finding]:
             remedy = "state the axes in trial.toml, [axes] x = 'east', y = 'north', ..., or the frame; "
             remedy += "the two cannot both be right"
             found.append(
-                _finding(
+                finding_of(
                     one, "track_against_heading", ("north", "east", "psi"), float(t[int(np.argmax(gap))]), what, remedy
                 )
             )
@@ -198,12 +203,13 @@ def _course(one: Recording, course: Array, t: Array) -> list[Finding]:
     )
     check = "unit_slip" if slip else "track_against_heading"
     more = f": off by {slip[0]:.4g}, {slip[1]}" if slip else ""
-    return [_finding(one, check, ("psi", "north", "east"), pair.worst, words + more, remedy)]
+    return [finding_of(one, check, ("psi", "north", "east"), pair.worst, words + more, remedy)]
 
 
 def _lag_free(slope: float) -> float:
     """Drift makes a track turn somewhat less or more than the heading; a unit slip is told all the same."""
-    for value in (57.29578, 1.0 / 57.29578):
+    degrees = math.degrees(1.0)
+    for value in (degrees, 1.0 / degrees):
         if 0.6 < slope / value < 1.6:
             return slope / value
     return 1.0
@@ -215,13 +221,13 @@ def _speed_ratio(one: Recording, name: str, ratio: float, at: float) -> list[Fin
     slip = factor_between(ratio)
     if slip and abs(ratio - 1.0) > 0.25:
         remedy = f'state the right unit in trial.toml: [channels] "{header}" = "{name} [UNIT]", or that of the track'
-        return [_finding(one, "unit_slip", (name, "north", "east"), at, f"{words}: {slip[1]} exchanged", remedy)]
+        return [finding_of(one, "unit_slip", (name, "north", "east"), at, f"{words}: {slip[1]} exchanged", remedy)]
     if abs(ratio - 1.0) > 0.25:
         remedy = "look at units and scale of track and speed; the two cannot both be right"
-        return [_finding(one, "track_against_speed", (name, "north", "east"), at, words, remedy)]
+        return [finding_of(one, "track_against_speed", (name, "north", "east"), at, words, remedy)]
     if abs(ratio - 1.0) > 0.05:
         remedy = "a current, or a log that is off; [current] in trial.toml takes a current off the track"
-        return [_finding(one, "track_against_speed", (name, "north", "east"), at, words, remedy, "warning")]
+        return [finding_of(one, "track_against_speed", (name, "north", "east"), at, words, remedy, "warning")]
     return []
 
 

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import cache
+from importlib.resources import files
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
 from ident.trials.channels import plain
@@ -15,8 +18,6 @@ from sim.files.errors import InputError
 from sim.files.record import Record
 
 Array = NDArray[np.float64]
-# WGS 84: NIMA TR8350.2 (2000), table 3.1.
-_SEMI_MAJOR, _FLATTENING = 6378137.0, 1.0 / 298.257223563
 # Powers of the scale by which Froude's law brings a unit to full scale.
 _FROUDE = {"m": 1.0, "m/s": 0.5, "rad/s": -0.5, "1/s": -0.5}
 _TURNS = {"north": (0, 1.0), "south": (0, -1.0), "east": (1, 1.0), "west": (1, -1.0)}
@@ -64,6 +65,14 @@ def _scaled(one: Recording, scale: float) -> Recording:
     return one.with_(channels=channels, rows=rows, time_sigma=one.time_sigma * root, assumed=(*one.assumed, text))
 
 
+@cache
+def _ellipsoid() -> tuple[float, float]:
+    """Semi-major axis [m] and flattening of the WGS 84 ellipsoid, from ``data/ellipsoid.csv``."""
+    with (files("ident") / "data" / "ellipsoid.csv").open(encoding="utf-8") as stream:
+        values = pd.read_csv(stream).set_index("name")["value"]
+    return float(values["semi_major"]), 1.0 / float(values["inverse_flattening"])
+
+
 def tangent_plane(latitude: Array, longitude: Array) -> tuple[Array, Array]:
     """North and east [m] of points on the WGS 84 ellipsoid, in the plane that touches it at the first.
 
@@ -71,8 +80,9 @@ def tangent_plane(latitude: Array, longitude: Array) -> tuple[Array, Array]:
     ----------
     latitude, longitude : (n,) [rad].
     """
-    square = _FLATTENING * (2.0 - _FLATTENING)
-    across = _SEMI_MAJOR / np.sqrt(1.0 - square * np.sin(latitude) ** 2)
+    semi_major, flattening = _ellipsoid()
+    square = flattening * (2.0 - flattening)
+    across = semi_major / np.sqrt(1.0 - square * np.sin(latitude) ** 2)
     x = across * np.cos(latitude) * np.cos(longitude)
     y = across * np.cos(latitude) * np.sin(longitude)
     z = across * (1.0 - square) * np.sin(latitude)

@@ -21,6 +21,7 @@ KINDS = (
     "vertical_zigzag",
     "turning_circle",
     "direct_spiral",
+    "reverse_spiral",
     "pull_out",
     "stopping",
     "roll_decay",
@@ -54,7 +55,8 @@ class Maneuver:
     @property
     def horizontal(self) -> bool:
         """Whether rudder and heading make it."""
-        return self.kind in ("zigzag", "turning_circle", "direct_spiral", "pull_out", "stopping", "course_keeping")
+        turns = ("zigzag", "turning_circle", "direct_spiral", "reverse_spiral")
+        return self.kind in (*turns, "pull_out", "stopping", "course_keeping")
 
     def __str__(self) -> str:
         if self.check is not None:
@@ -79,7 +81,8 @@ def stated(text: str) -> Maneuver:
             raise InputError("maneuver", repr(text), "a zigzag with rudder and check angle: zigzag 20/20")
         kind = "vertical_zigzag" if "vert" in low or "vzz" in low or "depth" in low else "zigzag"
         return Maneuver(kind, float(angles[1]), float(angles[2]))
-    words = {"turn": "turning_circle", "spiral": "direct_spiral", "pull": "pull_out", "stop": "stopping"}
+    words = {"turn": "turning_circle", "reverse": "reverse_spiral", "bech": "reverse_spiral"}
+    words |= {"spiral": "direct_spiral", "pull": "pull_out", "stop": "stopping"}
     words |= {"roll": "roll_decay", "rise": "rise", "max q": "rise", "surfac": "rise", "depth": "depth_change"}
     words |= {"course keep": "course_keeping", "heading keep": "course_keeping"}
     kind = next((k for word, k in words.items() if word in low), "")
@@ -221,6 +224,25 @@ def _by_angle(one: Recording, name: str) -> tuple[Maneuver, str] | None:
     return Maneuver(kind, None, check), text + f' deg. State it if it is another: --maneuver "{kind} D/C"'
 
 
+def _rudder_fits(one: Recording, angle: str, found: Maneuver) -> None:
+    """Refuse a zigzag that the heading shows, and a recorded rudder that does not go to and fro in steps.
+
+    Raises
+    ------
+    InputError
+        Naming the column of the rudder.
+    """
+    control = control_of(one, angle == "theta")
+    if control is None or found.check is None or float(np.ptp(control.value)) < math.radians(1.0):
+        return
+    header, turning = one.headers[control.channel], one.headers[angle]
+    what = f"{turning} makes a zigzag, and {header} holds no steps to and fro by one angle: channels exchanged?"
+    text = (
+        f'trial.toml: [channels] "{header}" = the channel that it is, or "-" to leave it out; or --maneuver zigzag D/C'
+    )
+    raise InputError(f"{one.file}, column {header}", what, text)
+
+
 def maneuver_of(one: Recording, text: str) -> tuple[Maneuver, str]:
     """The maneuver of a record, and by what it is known.
 
@@ -241,6 +263,7 @@ def maneuver_of(one: Recording, text: str) -> tuple[Maneuver, str]:
     for angle in ("psi", "theta"):
         by_angle = _by_angle(one, angle) if angle in one.channels else None
         if by_angle:
+            _rudder_fits(one, angle, by_angle[0])
             return by_angle[0], "maneuver: " + by_angle[1]
     if "psi" not in one.channels and "north" in one.channels:
         return Maneuver("turning_circle"), "turning circle: a track without heading"

@@ -23,12 +23,15 @@ from ident.trials.maneuvers import Maneuver, control_of, holds
 from ident.trials.reading import Recording
 from ident.trials.spec import TrialFile
 from sim.files.errors import InputError
+from sim.files.record import Record
 
 Array = NDArray[np.float64]
 Channels = dict[str, Array]
 Metrics = dict[str, float | None]
 DRAWS = 200
 _STEP_S, _GRID = 0.15, (1200, 3000)
+# A boat that makes this share of its approach speed has all but stopped.
+_STILL = 0.05
 # No record says when and where more closely than this, in the unit of the metric.
 _LEAST = {"deg": 1e-3, "s": 1e-3, "m": 1e-3, "deg/s": 1e-4, "m/s": 1e-4, "-": 1e-5, "%": 1e-3, "deg s/deg": 1e-3}
 
@@ -163,6 +166,47 @@ def _steps(one: Recording) -> list[tuple[float, float]]:
     return [(h.value, h.end) for h in levels if h.end - h.start > 5.0]
 
 
+# A step of a reverse spiral is held for longer; its rudder is that of so many seconds before its end; yaw rates are
+# ordered in steps of so much.
+_HELD_S, _MEAN_S, _RATE = 20.0, 30.0, math.radians(0.05)
+
+
+def _yaw_steps(one: Recording, paths: dict[str, SmoothPath], start: Start) -> list[tuple[float, float]]:
+    """Ordered yaw rate and end of each step of a reverse spiral, on the clock of the execute."""
+    lo, hi = max(start.time, float(paths["psi"].knots[4])), float(paths["psi"].knots[-5])
+    t = np.arange(lo, hi, 1.0)
+    rate = Record("r", t, paths["psi"](t, 1), "rad/s")
+    levels = [h for h in holds(rate) if h.end - h.start > _HELD_S]
+    if len(levels) < 2:
+        raise InputError(one.file, f"{len(levels)} yaw rates held for {_HELD_S:g} s", "the steps of a reverse spiral")
+    return [(_RATE * round(h.value / _RATE), h.end - start.time) for h in levels]
+
+
+def _reverse(one: Recording, paths: dict[str, SmoothPath], start: Start) -> Callable[[Drawn], Metrics]:
+    """The rudder of each step, with an error of its own for each draw."""
+    control = control_of(one)
+    if control is None:
+        raise InputError(one.file, "no rudder in the record", "a column of the rudder angle: it is what is measured")
+    ends = _yaw_steps(one, paths, start)
+    t, rudder = control.abscissa - start.time, control.value
+    rng = np.random.default_rng(1)
+    errors = []
+    for _, end in ends:
+        own = rudder[(t > end - _MEAN_S) & (t <= end)]
+        # What the rudder does from second to second is not independent: a pair of swings, at least, is.
+        swings = 1 + int(np.count_nonzero(np.diff(np.sign(own - own.mean()))))
+        errors.append(float(own.std()) / math.sqrt(max(swings, 2)) if own.size > 1 else 0.0)
+    first = [True]
+
+    def measure(drawn: Drawn) -> Metrics:
+        away = np.zeros(len(ends)) if first[0] else np.array(errors) * rng.standard_normal(len(ends))
+        first[0] = False
+        shift = np.interp(t, [end for _, end in ends], away)
+        return turning.reverse_spiral({"t": t, "dH": rudder + shift}, ends)[0]
+
+    return measure
+
+
 def _horizontal(one: Drawn, start: Start) -> Channels:
     """Channels t, psi, r, and x and y along and across the course at the execute."""
     channels: Channels = {"t": one.time - start.time}
@@ -188,9 +232,18 @@ def _stopping(one: Drawn, start: Start) -> Metrics:
     speed = channels.get("u", channels.get("U"))
     if speed is None:
         speed = np.hypot(one.rates["north"], one.rates["east"])
-    still = np.flatnonzero(speed <= 0.02 * float(speed[0]))
+    still = np.flatnonzero(speed <= _STILL * float(speed[0]))
     end = int(still[0]) + 1 if still.size else len(speed)
-    short = {k: v[:end] for k, v in channels.items()}
+    short = {k: v[:end].copy() for k, v in channels.items()}
+    if end > 20:
+        # The speed falls on to zero as it fell before: the last of it is under the noise.
+        slope = np.polyfit(short["t"][-20:], speed[end - 20 : end], 1)[0]
+        rest = -float(speed[end - 1]) / slope if still.size and slope < 0.0 else 0.0
+        way = 0.5 * rest * max(float(speed[end - 1]), 0.0)
+        across = float(short["psi"][-1]) if "psi" in short else 0.0
+        short["t"][-1] += rest
+        for name, share in (("s", 1.0), ("x", math.cos(across)), ("y", math.sin(across))):
+            short[name][-1] += way * share
     short.setdefault("psi", np.zeros(end))
     return turning.stopping(short, bool(still.size))
 
@@ -232,6 +285,7 @@ _NEEDS = {
     "zigzag": ("psi",),
     "vertical_zigzag": ("theta",),
     "direct_spiral": ("psi",),
+    "reverse_spiral": ("psi",),
     "pull_out": ("psi",),
     "stopping": ("north",),
     "roll_decay": ("phi",),
@@ -242,7 +296,12 @@ _NEEDS = {
 
 
 def _estimator(
-    one: Recording, maneuver: Maneuver, start: Start, spec: TrialFile, likely: Drawn
+    one: Recording,
+    maneuver: Maneuver,
+    start: Start,
+    spec: TrialFile,
+    likely: Drawn,
+    paths: dict[str, SmoothPath],
 ) -> Callable[[Drawn], Metrics]:
     """The function that measures a draw."""
     missing = [c for c in _NEEDS.get(maneuver.kind, ()) if c not in likely.values]
@@ -252,6 +311,8 @@ def _estimator(
     if maneuver.kind in ("zigzag", "vertical_zigzag"):
         sense = sense_of(likely, "psi" if maneuver.kind == "zigzag" else "theta")
         return lambda drawn: _zigzag(drawn, maneuver, start, sense)
+    if maneuver.kind == "reverse_spiral":
+        return _reverse(one, paths, start)
     if maneuver.kind in ("direct_spiral", "pull_out"):
         ends = [(value, end - start.time) for value, end in _steps(one)]
         if maneuver.kind == "pull_out":
@@ -310,7 +371,7 @@ def measured(
     end = _range(paths)[1]
     grid = _grid(start.time, end)
     likely = _most_likely(paths, grid, start)
-    measure = _estimator(one, maneuver, start, spec, likely)
+    measure = _estimator(one, maneuver, start, spec, likely, paths)
     again = _most_likely({k: p.again() for k, p in paths.items()}, grid, start)
     found = with_errors(measure, likely, again, _draws(paths, grid, start, count, 0))
     return found | _approach_speed(one, paths, start)

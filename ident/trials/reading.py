@@ -78,6 +78,9 @@ def _source(path: Path, spec: TrialFile) -> Source:
         return source
     columns = reader_of(path, source) == "columns"
     lines = head(path, source.encoding, (), source.skip).text
+    if not columns and not spec.delimiter and _below_a_title(lines):
+        # The commas are those of a title: the columns are parted by blanks.
+        source, columns = source.model_copy(update={"reader": "columns"}), True
     mark = next((m for m in (";", "\t", ",") if not columns and any(m in t for t in lines[:_TITLES])), None)
     named = [i for i, line in enumerate(lines[:_TITLES]) if _names(line, mark) >= 2]
     if not columns:
@@ -90,6 +93,15 @@ def _source(path: Path, spec: TrialFile) -> Source:
         allowed = "a header with the names of the columns, or header_pattern in trial.toml"
         raise InputError(str(path), "columns without a header that names channels", allowed)
     return source.model_copy(update={"header_pattern": _exactly(lines[named[-1]])})
+
+
+def _below_a_title(lines: list[str]) -> bool:
+    """Whether no line parted by a delimiter names channels, and one parted by blanks does, with numbers below."""
+    marks = [m for m in (";", "\t", ",") if any(m in t for t in lines[:_TITLES])]
+    if any(_names(line, m) >= 2 for m in marks for line in lines[:_TITLES]):
+        return False
+    at = next((i for i, line in enumerate(lines[:_TITLES]) if _names(line, None) >= 2), -1)
+    return at > 0 and not any(m in lines[-1] for m in marks)
 
 
 def _names(line: str, mark: str | None) -> int:
@@ -160,6 +172,12 @@ def _meanings(sheet: Sheet, header: list[str], spec: TrialFile, said: list[str])
         if key not in header and key not in [h.partition(" [")[0] for h in header]:
             raise InputError(f"{sheet.path}, key channels", f"no column {key!r}", ", ".join(header)[:200])
     found = [meaning(h, spec.channels.get(h, spec.channels.get(h.partition(" [")[0])), sheet.where) for h in header]
+    if sum(f is not None and f.channel == "z" for f in found) > 1:
+        # A depth of the sail top beside that of the boat, as ``ident fly`` writes: one depth is enough.
+        for i, f in enumerate(found):
+            if f is not None and f.channel == "z" and plain(f.header).startswith("d0"):
+                said.append(f"{f.header}: not used, z is the depth")
+                found[i] = None
     for one in (f for f in found if f is not None):
         twice = [f.header for f in found if f is not None and f.channel == one.channel]
         if len(twice) > 1:

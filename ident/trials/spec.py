@@ -17,7 +17,13 @@ Axis = Literal["north", "east", "south", "west"]
 
 
 class EarthAxes(Data):
-    """Where the record's ``x`` and ``y`` point."""
+    """Where the record's ``x`` and ``y`` point.
+
+    Attributes
+    ----------
+    x : ``north``, ``east``, ``south`` or ``west``.
+    y : The same, along the other line.
+    """
 
     x: Axis
     y: Axis
@@ -31,7 +37,13 @@ class EarthAxes(Data):
 
 
 class Start(Data):
-    """State at the execute: the ordered course, and where the boat was; found on the record when absent."""
+    """State at the execute: the ordered course, and where the boat was; found on the record when absent.
+
+    Attributes
+    ----------
+    heading_deg : Ordered course [deg].
+    x_m, y_m : Position, along the record's axes [m].
+    """
 
     heading_deg: Annotated[float, Field(ge=-720, le=720)] | None = None
     x_m: float | None = None
@@ -39,7 +51,18 @@ class Start(Data):
 
 
 class Noise(Data):
-    """Standard errors of single samples, where they are better known than the record shows."""
+    """Standard errors of single samples, where they are better known than the record shows.
+
+    Attributes
+    ----------
+    heading_deg : Of the heading [deg].
+    pitch_deg : Of the pitch [deg].
+    roll_deg : Of the heel [deg].
+    yaw_rate_degps : Of the yaw rate [deg/s].
+    position_m : Of each coordinate of the track [m].
+    depth_m : Of the depth [m].
+    speed_mps : Of the speed [m/s].
+    """
 
     heading_deg: Positive | None = None
     pitch_deg: Positive | None = None
@@ -51,9 +74,13 @@ class Noise(Data):
 
 
 class Current(Data):
-    """A steady current: speed, and the direction it flows to, clockwise from north.
+    """A steady current.
 
-    ``correct``: the track is made one through the water before it is measured.
+    Attributes
+    ----------
+    speed_mps : Its speed [m/s].
+    to_deg : Direction it flows to, clockwise from north [deg].
+    correct : Whether the track is made one through the water before it is measured.
     """
 
     speed_mps: Annotated[float, Field(ge=0, le=20)]
@@ -66,14 +93,28 @@ class TrialFile(Data):
 
     Attributes
     ----------
-    maneuver : ``zigzag 20/20``, ``vertical zigzag 10/10``, ``turning_circle``, ...
+    name : Of the trial.
+    maneuver : ``zigzag 20/20``, ``vertical zigzag 10/10``, ``turning_circle``, ...; found when absent.
     channels : Header -> channel, perhaps with unit: ``Gier = "psi [deg]"``; ``"-"`` leaves a column out.
-    execute_s : Time of the first execute on the record's clock.
+    execute_s : Time of the first execute on the record's clock [s].
+    initial : Course and place at the execute.
+    axes : Where the record's x and y point.
     scale : Full-scale length over that of the model; Froude's law brings the record to full scale.
-    length_m : Reference length of the boat at full scale, for the criteria.
-    step_m : Ordered change of depth, down.
-    density_kgpm3, loading : Stated in the report, and in what is compared with the record.
-    wrap_deg : Turn after which a heading starts again; found when absent.
+    frame : Directions of the body axes that heading, heel, pitch, rates and depth are counted in.
+    wrap_deg : Turn after which a heading starts again, 180 or 360; found when absent.
+    noise : Standard errors of samples.
+    current : A steady current.
+    length_m : Reference length of the boat at full scale, for the criteria [m].
+    density_kgpm3 : Of the water; stated in the report, and in what is compared with the record.
+    step_m : Ordered change of depth, down [m].
+    loading : Loading condition, stated in the report.
+    source : Where the record comes from.
+    delimiter : Where it cannot be found out.
+    decimal : Decimal mark, where it cannot be found out.
+    encoding : Of the text, where no byte order mark says it.
+    header_pattern : Regular expression that finds the header line.
+    skip : Regular expression of lines that are no data.
+    units_row : Whether the row below the header holds the units.
     """
 
     name: str = ""

@@ -14,11 +14,13 @@ from ident.timeseries.smoothing import SmoothPath
 from ident.trials.alignment import Start, paths, start_of
 from ident.trials.consistency import check_recording, refused
 from ident.trials.earth import in_program_axes
+from ident.trials.exchanged import exchanged
 from ident.trials.maneuvers import Maneuver, control_of, maneuver_of
 from ident.trials.measure import DRAWS, Value, measured
 from ident.trials.reading import Recording, read_recording
 from ident.trials.spec import TrialFile
 from ident.trials.spikes import without_spikes
+from ident.trials.thinning import with_white_noise
 from sim.files.errors import InputError
 
 # A zigzag has its check angle at this share of the plane angle or more, and swings by less than this [deg].
@@ -125,7 +127,7 @@ def measure_trial(path: Path, spec: TrialFile | None = None, count: int = DRAWS)
     """
     spec = spec or TrialFile()
     one = in_program_axes(without_spikes(read_recording(path, spec)), spec)
-    findings = [*one.findings, *check_recording(one)]
+    findings = [*one.findings, *exchanged(one), *check_recording(one)]
     # Exchanged channels would be taken for a maneuver that was not made.
     refused(one, [f for f in findings if f.check == "exchanged_channels"], True, True)
     try:
@@ -138,6 +140,7 @@ def measure_trial(path: Path, spec: TrialFile | None = None, count: int = DRAWS)
     sure = _borne_out(one, maneuver, findings)
     refused(one, findings, track, sure)
     try:
+        one = with_white_noise(one)
         start = start_of(one, maneuver, spec)
         found, taken = paths(one, start, spec)
         metrics = measured(one, maneuver, start, found, spec, count)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from ident.estimates.ablation import without
 from ident.estimates.draft import measured_rows
+from ident.validation.essentials import refuse_without_essentials
 from sim.boat.coefficients import Coefficients
 from sim.boat.database import Version, last_own, read_rows, versions
 from sim.boat.mass import Environment
@@ -148,6 +149,7 @@ class Fleet:
                     known = ", ".join(sorted(every["vehicle"].unique()))
                     raise InputError(self.db, f"no coefficients of vehicle {vehicle.name!r}", known)
                 commit = last_own(self._history, vehicle.name, number) or self.record
+                refuse_without_essentials(vehicle, rows, commit.metadata, self.db)
                 if self.left_out and number == self.number:
                     rows = without(vehicle, rows, commit.metadata, self.left_out, "--without")
                 self._boats[key] = Boat(vehicle, rows, commit, Coefficients(vehicle, rows))

@@ -14,6 +14,7 @@ from ident.captive.readers.solvers import fluent_header, open_fluent, open_plots
 from ident.captive.readers.spreadsheet import open_workbook
 from ident.captive.readers.table import Sheet, open_columns, open_csv
 from ident.captive.readers.text import COMMENTS, Lines, head, opened, sniff
+from ident.captive.readers.universal import open_universal
 from ident.captive.source import Source
 from sim.files.errors import InputError
 
@@ -35,6 +36,7 @@ OPENERS = {
     "fluent": open_fluent,
     "su2": open_su2,
     "tecplot": open_tecplot,
+    "universal": open_universal,
 }
 # What a file begins with that says its format.
 _BEGIN = {
@@ -47,6 +49,8 @@ _BEGIN = {
     b"CDF\x02": "netcdf",
     b"TDSm": "tdms",
     b"LabVIEW Measurement": "lvm",
+    b"    -1\n": "universal",
+    b"    -1\r\n": "universal",
 }
 _ENDINGS = {".parquet": "parquet", ".mat": "matlab", ".nc": "netcdf"}
 
@@ -77,7 +81,7 @@ def _is_hidden(path: Path, folder: Path, pattern: str) -> bool:
 def reader_of(path: Path, source: Source) -> str:
     """The format of a file: as declared, else by its content.
 
-    A folder is an OpenFOAM case; workbooks, MATLAB, HDF5, netCDF, TDMS, LVM and Parquet files say it in
+    A folder is an OpenFOAM case; workbooks, MATLAB, HDF5, netCDF, TDMS, LVM, universal and Parquet files say it in
     their first bytes, Fluent, SU2 and Tecplot files in their first lines; ``Monitor`` in the header
     is STAR-CCM+; a header with ``;``, a tab or ``,`` is a table; the rest are columns.
     """

@@ -361,9 +361,9 @@ def numbers(
 def odd(cell: str) -> str:
     """What to do with a cell that holds a number and something else; empty for other cells."""
     if re.search(r"\d\s*(±|\+/?-|\+\u2212)\s*\d", cell):
-        return "; the number after the sign in a column sigma_... of its own, as one standard error"
+        return "; an error behind the number is read in loads, KT, KQ, t and value of a table of runs alone"
     if re.search(r"\d\s*[*\u2020\u2021\u00a7#a-d]$", cell):
-        return "; a footnote mark: take it off, and give the run the quality word or the exclude that it stands for"
+        return "; a footnote mark: marks = { a = '...' } in [[source]] says which quality word it stands for"
     if re.fullmatch(r"\(\s*\d[\d.,]*\s*\)", cell):
         return "; a number in brackets may be negative or doubtful: write it with its sign"
     return ""

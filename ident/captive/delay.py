@@ -1,0 +1,144 @@
+"""The time by which loads come behind the motion, from a record that lets it be seen.
+
+A steady oscillation does not: a lag turns velocity into acceleration, as another added mass would. Two things do.
+
+* A motion that is more than one line (a start from rest, a ramp, two frequencies): the loads are fitted by
+  velocity, acceleration and velocity times its size of the measured displacement, all of them late by one time,
+  y(t) = c0 + c1 v(t - tau) + c2 a(t - tau) + c3 v|v|(t - tau), and tau is that of the least squares (a separable
+  problem: Golub and Pereyra 1973, SIAM J Numer Anal 10:413-432). Its standard error is that of the curvature there.
+* A channel of rate or acceleration beside the displacement: the phase it should have is known.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+from scipy.optimize import minimize_scalar
+
+from ident.captive.source import MOTIONS
+from sim.boat.catalogue import OUTPUTS
+
+Array = NDArray[np.float64]
+
+# Lags that are tried, in periods of the oscillation, and their number; the step that shows the curvature.
+_WIDEST = 0.2
+_TRIED = 41
+_STEP = 0.02
+# Samples that are looked at, after averaging neighbours; fewest in a period.
+_MOST = 4096
+_PER_PERIOD = 12
+# A lag is seen when its standard error is below this share of a period, and no other lag fits as well by so
+# many standard errors.
+_SEEN = 0.005
+_SURE = 6.0
+
+
+@dataclass(frozen=True)
+class Delay:
+    """By how much something comes behind the motion.
+
+    Attributes
+    ----------
+    what : Channels, in words.
+    seconds, stderr : [s]; what is stated is taken off already.
+    """
+
+    what: str
+    seconds: float
+    stderr: float
+
+
+def of_loads(
+    time: Array, values: Array, weight: Array, names: list[str], frequency: float, stated: dict[str, float]
+) -> Delay | None:
+    """The one lag of all loads behind the measured displacement.
+
+    Parameters
+    ----------
+    time : (n,) [s]; ``values`` (n, channels) along the body; ``weight`` (n,).
+    names : Of the channels.
+    frequency : Of the oscillation [Hz].
+    stated : Channel -> delay that is taken off.
+
+    Returns
+    -------
+    None where there is no displacement, or where its motion does not let a lag be seen.
+    """
+    loads = [n for n in names if n in OUTPUTS]
+    step, period = max(1, time.size // _MOST), 1.0 / frequency
+    n = time.size // step
+    if "displacement" not in names or not loads or n < 4 * _PER_PERIOD:
+        return None
+    t, w = _means(time, step, n), _means(weight, step, n)
+    inside = (t > t[0] + 0.5 * period) & (t < t[-1] - 0.5 * period)
+    if np.median(np.diff(t)) > period / _PER_PERIOD or inside.sum() < 4 * _PER_PERIOD:
+        return None
+    moved = CubicSpline(t, _means(values[:, names.index("displacement")], step, n))
+    root = np.sqrt(w[inside] / w[inside].mean())
+    y = np.stack([_means(values[:, names.index(o)], step, n)[inside] * root for o in loads], axis=1)
+    early = [t[inside] - stated.get(o, 0.0) + stated.get("displacement", 0.0) for o in loads]
+
+    def residuals(tau: float) -> Array:
+        return np.stack([_residual(moved, at - tau, root, y[:, c]) for c, at in enumerate(early)], axis=1)
+
+    grid = np.linspace(-_WIDEST, _WIDEST, _TRIED) * period
+    rests = np.array([(residuals(float(tau)) ** 2).sum(axis=0) for tau in grid])
+    # Each load weighs by what is left of it at its best; one that the motion does not make, by its noise.
+    noise = np.maximum(rests.min(axis=0), 1e-12 * ((y - y.mean(axis=0)) ** 2).sum(axis=0) + 1e-300) / len(y)
+
+    def left(tau: float) -> float:
+        return float(((residuals(tau) ** 2).sum(axis=0) / noise).sum())
+
+    k = int(np.argmin((rests / noise).sum(axis=1)))
+    if k in (0, _TRIED - 1):
+        return None
+    best = minimize_scalar(left, bounds=(grid[k - 1], grid[k + 1]), method="bounded", options={"xatol": 1e-6 * period})
+    tau, h = float(best.x), _STEP * period
+    curvature = (left(tau - h) + left(tau + h) - 2.0 * left(tau)) / h**2
+    rest = residuals(tau) / np.sqrt(noise)
+    rho = min(max(float((rest[1:] * rest[:-1]).sum() / max((rest**2).sum(), 1e-300)), 0.0), 0.999)
+    correlated = (1.0 + rho) / (1.0 - rho)
+    error = math.sqrt(2.0 / curvature * correlated) if curvature > 0.0 else math.inf
+    # Another lag that fits about as well: none is seen.
+    others = (rests / noise).sum(axis=1)[np.abs(grid - tau) > 2.0 * _STEP * period] - left(tau)
+    alone = bool((others > _SURE**2 * correlated).all())
+    return Delay(f"the loads {' '.join(loads)}", tau, error) if alone and error < _SEEN * period else None
+
+
+def _residual(moved: CubicSpline, at: Array, root: Array, y: Array) -> Array:
+    """What velocity, acceleration and velocity times its size at other times leave of a load."""
+    v, a = moved(at, 1), moved(at, 2)
+    x = np.column_stack([np.ones(at.size), v, a, v * np.abs(v)]) * root[:, None]
+    x /= np.maximum(np.sqrt((x**2).mean(axis=0)), 1e-300)
+    return np.asarray(y - x @ np.linalg.lstsq(x, y, rcond=1e-10)[0], dtype=float)
+
+
+def of_rate(name: str, motion: str, harmonics: Array, covariance: Array, frequency: float) -> Delay | None:
+    """The lag of a measured rate or acceleration behind the displacement, whose phase it should have.
+
+    Parameters
+    ----------
+    name : Channel, of ``MOTIONS[motion]``.
+    motion : What oscillates.
+    harmonics : (7,) of the channel, in the phase of the displacement, stated delays taken off.
+    covariance : Theirs (7, 7).
+    frequency : [Hz].
+    """
+    s, c = harmonics[1:3]
+    size = math.hypot(s, c)
+    error = math.sqrt(max(0.5 * float(covariance[1, 1] + covariance[2, 2]), 0.0))
+    if size <= 10.0 * error or name not in MOTIONS[motion]:
+        return None
+    # Displacement sin: the rate is a cosine, the acceleration a negative sine.
+    expected = 0.5 * math.pi if name == MOTIONS[motion][0] else math.pi
+    behind = math.remainder(expected - math.atan2(c, s), 2.0 * math.pi)
+    omega = 2.0 * math.pi * frequency
+    return Delay(name, behind / omega, error / size / omega)
+
+
+def _means(x: Array, step: int, n: int) -> Array:
+    return np.asarray(x[: n * step].reshape(n, step).mean(axis=1), dtype=float)

@@ -1,0 +1,76 @@
+"""The motion of an oscillatory test as its record has it: frequency, phase."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from ident.captive.channels import Channels, Timed, timed
+from ident.captive.source import Reduction
+from ident.timeseries import blocks as condense
+from ident.timeseries.frequency import Line, estimate
+from sim.boat.catalogue import OUTPUTS
+from sim.files.errors import InputError
+
+# A stated frequency that is off by more than this part of itself is another test's; one that the record
+# contradicts by so many standard errors, and by so many cycles from end to end, is replaced by the record's.
+_OFF = 0.05
+_SURE = 4.0
+_DRIFT = 2e-3
+# A clock that starts later than so many steps does not start with the motion.
+_LATE = 1.5
+
+
+def line_of(pieces: Timed, names: list[str], frequency: float | None, channels: Channels) -> Line | None:
+    """The oscillation of the displacement, or else of the loads."""
+    condensed = condense.condense(pieces, condense.constant, len(names))
+    weight, time, _, values = condensed.blocks()
+    chosen = (
+        [names.index("displacement")]
+        if "displacement" in names
+        else [c for c, name in enumerate(names) if name in OUTPUTS]
+    )
+    if frequency is None and "displacement" not in names:
+        raise InputError(str(channels.path), "no frequency", "frequency_hz in [source.reduction], or frequency")
+    found = estimate(time, values[:, chosen], weight, frequency) if time.size else None
+    return None if found is None else replace(found, channel=chosen[found.channel])
+
+
+def frequency_of(
+    line: Line | None, stated: float | None, names: list[str], rule: Reduction, channels: Channels
+) -> tuple[float, float | None]:
+    """The frequency to use, and the stated one where the record says another."""
+    if stated is None or not stated > 0.0:
+        if line is None:
+            text = "frequency_hz in [source.reduction], or frequency; the displacement holds no clear oscillation"
+            raise InputError(str(channels.path), "no frequency", text)
+        return line.frequency, None
+    if line is None:
+        return stated, None
+    off = abs(line.frequency - stated)
+    if off > _OFF * stated:
+        found = f"frequency_hz = {stated:g}, and {names[line.channel]} oscillates at {line.frequency:.5g} Hz"
+        raise InputError(str(channels.path), found, f"the frequency of the motion, to {100 * _OFF:g} %")
+    drift = off * span_of(channels, rule)
+    return (line.frequency, stated) if off > _SURE * line.stderr and drift > _DRIFT else (stated, None)
+
+
+def span_of(channels: Channels, rule: Reduction) -> float:
+    """Length of a history within its window [s]."""
+    first, last = math.inf, -math.inf
+    for time, _ in timed(channels, rule):
+        first, last = min(first, float(time[0])), float(time[-1])
+    return last - first
+
+
+def phase_is_known(channels: Channels, rule: Reduction, names: list[str]) -> None:
+    """A phase that is not stated is that of a clock that starts at zero, or a channel's."""
+    if "displacement" in names or "phase_deg" in rule.model_fields_set or rule.rate_hz is not None:
+        return
+    time = next((time for time, _ in timed(channels, rule.model_copy(update={"start_s": None}))), np.zeros(0))
+    if time.size > 1 and abs(time[0]) > _LATE * abs(time[1] - time[0]):
+        text = "phase_deg in [source.reduction]: that of the displacement at time zero of this clock "
+        text += "(phase_deg = 0.0 where it is zero), or a column displacement"
+        raise InputError(str(channels.path), f"a clock that starts at {time[0]:g} s, and no phase", text)

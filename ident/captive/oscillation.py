@@ -1,0 +1,129 @@
+"""The four instants of an oscillatory test, each a run of its own, from the harmonics of its loads."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ident.captive.quantities import HARMONICS, TAKEN
+from ident.captive.source import MOTIONS, Reduction
+from sim.boat.catalogue import OUTPUTS
+from sim.boat.forces import body_velocity
+from sim.files.errors import InputError
+from sim.files.frames import Frame
+
+Array = NDArray[np.float64]
+
+# The four states of an oscillation: name, phase of the displacement A sin(theta).
+PHASES = {"+v": 0.0, "-v": math.pi, "+a": math.pi / 2, "-a": 3 * math.pi / 2}
+
+
+# Amplitudes of rate and acceleration in a table are printed with three digits or more.
+_AGREE = 0.02
+
+
+# Test whose terms a state at the end of the velocity identifies.
+_STEADY_TEST = {"surge": "towing", "sway": "drift_horizontal", "heave": "drift_vertical"}
+
+
+def phase_row(theta: float) -> Array:
+    """Weights of mean, in, out, in2, out2, in3, out3 in the load at phase ``theta``.
+
+    The third harmonic in phase is left out: a load that is a function of the velocity and
+    linear in the acceleration has none, so at the ends of the acceleration it is noise.
+    """
+    row = np.array([1.0, *(f(k * theta) for k in (1, 2, 3) for f in (math.sin, math.cos))])
+    row[HARMONICS.index("in3")] = 0.0
+    return row
+
+
+def states(run: dict[str, Any], rule: Reduction, frame: Frame, ittc: bool, where: str) -> list[dict[str, Any]]:
+    """Four instants of an oscillatory test, each a run of its own.
+
+    The displacement is A sin(theta); the velocity A w cos(theta) is largest at 0 and pi,
+    the acceleration -A w^2 sin(theta) at pi/2 and 3 pi/2. The load there is the sum of its
+    harmonics 0-3 (in phase: of sine, in quadrature: of cosine).
+
+    Parameters
+    ----------
+    run : Base state (SI, campaign frame), ``X_mean``, ``X_in``, ..., ``frequency`` [Hz], and
+        one of ``amplitude`` or the acceleration's amplitude (-A w^2, signed).
+    rule : Says what oscillates.
+    frame, ittc : Of the campaign: direction of the axis that moves, sign of drift.
+    where : For the error.
+
+    Raises
+    ------
+    InputError
+        Without frequency, amplitude, or any load.
+    """
+    assert rule.motion is not None
+    speed_name, acceleration_name = MOTIONS[rule.motion]
+    omega = 2.0 * math.pi * float(run.get("frequency", rule.frequency_hz) or math.nan)
+    if not omega > 0.0:
+        raise InputError(f"{where}, column frequency", "nothing", "a frequency, or frequency_hz in [source.reduction]")
+    speed, given = _amplitudes(run, rule, omega, where)
+    found = []
+    for name, theta in PHASES.items():
+        state = {k: v for k, v in run.items() if "_" not in k or k.split("_")[-1] not in HARMONICS}
+        state["run_id"] = f"{run['run_id']}{name}"
+        at_velocity = name.endswith("v")
+        _move(state, speed_name, speed * math.cos(theta) if at_velocity else 0.0, frame, ittc)
+        state[acceleration_name] = 0.0 if at_velocity else given * math.sin(theta)
+        usual = _STEADY_TEST.get(rule.motion, "rotating_arm")
+        state["test"] = (run.get("test") or usual) if at_velocity else "acceleration"
+        weights = phase_row(theta)
+        for output in (*OUTPUTS, *(TAKEN + o for o in OUTPUTS)):
+            parts = np.array([run.get(f"{output}_{h}", math.nan) for h in HARMONICS], dtype=float)
+            if np.isnan(parts).all():
+                continue
+            state[output] = float(weights @ np.nan_to_num(parts))
+            if output in OUTPUTS and output in run.get("covariance", {}):
+                variance = float(weights @ run["covariance"][output] @ weights)
+                state[f"s_{output}"] = math.sqrt(max(variance, 0.0))
+        for name_ in ("covariance", "frequency", "amplitude", "displacement"):
+            state.pop(name_, None)
+        found.append(state)
+    return found
+
+
+def _amplitudes(run: dict[str, Any], rule: Reduction, omega: float, where: str) -> tuple[float, float]:
+    """Amplitudes of velocity (of cosine) and acceleration (of sine), from what the run gives."""
+    speed_name, acceleration_name = MOTIONS[rule.motion or "sway"]
+    amplitude = run.get("amplitude", rule.amplitude)
+    given = {k: run.get(k) for k in (speed_name, acceleration_name)}
+    known = {k: float(v) for k, v in given.items() if v is not None and not math.isnan(v)}
+    if acceleration_name in known:
+        speed = -known[acceleration_name] / omega
+    elif speed_name in known:
+        speed = known[speed_name]
+    elif amplitude is not None and not math.isnan(amplitude):
+        speed = float(amplitude) * omega
+    else:
+        text = f"amplitude in [source.reduction], a column displacement, or the amplitude {acceleration_name}"
+        raise InputError(f"{where}, column displacement", "nothing", text)
+    off = abs(speed - known.get(speed_name, speed))
+    if off > _AGREE * abs(speed):
+        found = f"amplitudes {speed_name} = {known[speed_name]:g} and {acceleration_name} = {-speed * omega:g}"
+        text = f"{acceleration_name} = -{speed_name} omega with omega = {omega:g} rad/s (displacement A sin)"
+        raise InputError(where, found, text)
+    return speed, -speed * omega
+
+
+def _move(state: dict[str, Any], name: str, velocity: float, frame: Frame, ittc: bool) -> None:
+    """Put the velocity of the oscillation into a state: a rate, or added to the flow."""
+    if name in "pqr":
+        state[name] = velocity
+        return
+    sign = -1.0 if ittc else 1.0
+    speed, alpha, beta = (float(np.nan_to_num(state.get(k, 0.0) or 0.0)) for k in ("U", "alpha", "beta"))
+    moving = np.array(body_velocity(speed, alpha, sign * beta))
+    moving["uvw".index(name)] += frame.sign(name) * velocity
+    size = float(np.linalg.norm(moving))
+    state["U"] = size
+    if size > 0.0:
+        state["alpha"] = math.atan2(moving[2], moving[0]) if moving[0] or moving[2] else 0.0
+        state["beta"] = sign * math.asin(max(-1.0, min(1.0, moving[1] / size)))
