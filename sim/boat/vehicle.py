@@ -437,7 +437,7 @@ def load_vehicle(name: str | Path, beside: str | Path = "") -> Vehicle:
     Raises
     ------
     InputError
-        For a missing file, a missing or unknown key, a value out of range, or as ``check_vehicle``.
+        For a missing file, also one that the vehicle file names, a missing or unknown key, a value out of range, or as ``check_vehicle``.
     """
     path = Path(name)
     there = Path(beside).parent / path if path.suffix == ".toml" else name
@@ -448,5 +448,8 @@ def load_vehicle(name: str | Path, beside: str | Path = "") -> Vehicle:
     folder = Path(where).parent if Path(where).suffix == ".toml" else Path(str(files("sim") / "vehicles"))
     for key in ("geometry", "errata", "terms"):
         if getattr(vehicle, key) is not None:
-            setattr(vehicle, key, str(folder / getattr(vehicle, key)))
+            path = folder / getattr(vehicle, key)
+            if not path.is_file():
+                raise InputError(f"{where}, key {key}", f"no file {getattr(vehicle, key)[:200]!r}", "a file beside it")
+            setattr(vehicle, key, str(path))
     return vehicle.turned(PROGRAM)
