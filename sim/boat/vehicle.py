@@ -437,7 +437,8 @@ def load_vehicle(name: str | Path, beside: str | Path = "") -> Vehicle:
     Raises
     ------
     InputError
-        For a missing file, also one that the vehicle file names, a missing or unknown key, a value out of range, or as ``check_vehicle``.
+        For a missing file, also one that the vehicle file names, a missing or unknown key, a value out of
+        range, or as ``check_vehicle``.
     """
     path = Path(name)
     there = Path(beside).parent / path if path.suffix == ".toml" else name
