@@ -42,7 +42,8 @@ def flown(coefficients):
 def recorded(flight, folder, seed: int = 1, approach: float = 30.0):
     """The flight as a trial: program channels with noise, at 2 Hz."""
     rng = np.random.default_rng(seed)
-    step = max(1, round(0.5 / (flight["t"][1] - flight["t"][0])))
+    # Twice a second; of spirals, which take hours, some thousand samples.
+    step = max(1, round(0.5 / (flight["t"][1] - flight["t"][0])), flight["t"].size // 2500)
     pick = np.arange(0, flight["t"].size, step)
     t = flight["t"][pick]
     before = np.arange(0.0, approach, t[1] - t[0])
