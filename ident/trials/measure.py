@@ -8,6 +8,7 @@ sampling, the bias of an extreme and the bias of smoothing.
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -196,11 +197,12 @@ def _reverse(one: Recording, paths: dict[str, SmoothPath], start: Start) -> Call
         # What the rudder does from second to second is not independent: a pair of swings, at least, is.
         swings = 1 + int(np.count_nonzero(np.diff(np.sign(own - own.mean()))))
         errors.append(float(own.std()) / math.sqrt(max(swings, 2)) if own.size > 1 else 0.0)
-    first = [True]
+    # The most likely path and its second smoothing come first, and have the rudder as recorded.
+    calls = itertools.count()
 
     def measure(drawn: Drawn) -> Metrics:
-        away = np.zeros(len(ends)) if first[0] else np.array(errors) * rng.standard_normal(len(ends))
-        first[0] = False
+        as_recorded = next(calls) < 2
+        away = np.zeros(len(ends)) if as_recorded else np.array(errors) * rng.standard_normal(len(ends))
         shift = np.interp(t, [end for _, end in ends], away)
         return turning.reverse_spiral({"t": t, "dH": rudder + shift}, ends)[0]
 
