@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from test_whatever_is_declared_counts import toml
+from toml_text import toml
 
 from ident.database.provenance import vehicle_stated
 from ident.schemas.describe import keys

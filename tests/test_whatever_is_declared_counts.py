@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+from toml_text import toml
 
 from ident.captive import campaign_file, source
 from ident.captive.campaign import read_campaign
@@ -50,21 +51,6 @@ c,5,8,25,0.05,-40000,-629000,-30000,-240000,-19000,-4500000
 """
 TIME = np.arange(0.0, 80.0, 0.1)
 OMEGA = 2.0 * np.pi * 0.25
-
-
-def toml(data: dict[str, Any]) -> str:
-    """Nested tables as inline TOML."""
-
-    def text(value: Any) -> str:
-        if isinstance(value, bool):
-            return str(value).lower()
-        if isinstance(value, dict):
-            return "{ " + ", ".join(f"{json.dumps(k)} = {text(v)}" for k, v in value.items()) + " }"
-        if isinstance(value, list):
-            return "[" + ", ".join(map(text, value)) + "]"
-        return json.dumps(value, ensure_ascii=False) if isinstance(value, str) else repr(value)
-
-    return "".join(f"{k} = {text(v)}\n" for k, v in data.items())
 
 
 def sway(lag: float = 0.0, extra: str = "", start: float = 0.0) -> str:
