@@ -18,6 +18,8 @@ _ALONG = 0.05
 _MOST_ADDED = (1.0, 5.0, 5.0, 5.0, 5.0, 5.0)
 # What errors of measurement may leave below zero, in the same measure.
 _LEAST_ADDED = -0.05
+# Faster than any rudder servo [deg/s].
+_FASTEST_PLANE = 1000.0
 _MOTIONS = ("surge", "sway", "heave", "roll", "pitch", "yaw")
 # Floating boats displace what they weigh; a submerged one differs by what its planes can carry.
 _OUT_OF_TRIM = 0.5
@@ -142,6 +144,14 @@ def _plane(plane: Any, vehicle: Any) -> Iterator[tuple[str, str, str]]:
         )
     if plane.limit_deg > 90.0:
         yield f"{key}, limit_deg", f"{plane.limit_deg:g}", "90 at most"
+    if plane.rate_degps > _FASTEST_PLANE:
+        yield f"{key}, rate_degps", f"{plane.rate_degps:g}", f"{_FASTEST_PLANE:g} at most"
+    if plane.mixer.dV == 0.0 and plane.mixer.dH == 0.0:
+        yield (
+            f"{key}, mixer",
+            "no share of any command",
+            "a share of dV or dH that is not zero: the plane would never move",
+        )
     partner = next(p for p in vehicle.planes if p.name == plane.mirror)
     if partner.mirror != plane.name:
         yield f"{key}, mirror", f"{plane.mirror!r}, which mirrors {partner.mirror!r}", "planes that mirror each other"
