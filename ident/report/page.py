@@ -7,7 +7,6 @@ import json
 import re
 from collections.abc import Sequence
 from datetime import UTC, datetime
-from functools import partial
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -319,7 +318,7 @@ def write_report(
     templates = Templates(
         loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
-    templates.filters |= {"spans": spans, "term_anchor": term_anchor, "plain": partial(_figure, digits=4)}
+    templates.filters |= {"spans": spans, "term_anchor": term_anchor, "plain": _figure}
     commit = own_version(db, boat.name, number)
     path = Path(out) / f"{re.sub(r'[^A-Za-z0-9._-]', '_', boat.name)}_v{number}.html"
     page_of_figures = path.with_name(f"{path.stem}_interactive.html")
