@@ -28,15 +28,13 @@ from ident.calibration.file import CalibrationFile, Parameter, Training, apply
 from ident.validation.references import check_reference
 from ident.validation.trial_reference import TRIAL, Referenced, referenced
 from sim.boat.coefficients import Coefficients
-from sim.boat.mass import Environment
 from sim.boat.vehicle import Vehicle, load_vehicle
 from sim.files.errors import InputError
 from sim.files.record import Record
 from sim.flight.case import Case, Series, load_case
-from sim.flight.simulate import Simulation, environment_of, equipped, fly, water_of
+from sim.flight.craft import Craft
+from sim.flight.simulate import Simulation, equipped, fly
 from sim.flight.trim import NoEquilibrium
-from sim.kernel.assemble import Assembly
-from sim.waves.in_waves import Water
 
 Array = NDArray[np.float64]
 Key = tuple[str, str, str]
@@ -105,8 +103,7 @@ class Problem:
     chosen : Groups with priors.
     cases : Case name -> (case, abscissa).
     channels : Training series.
-    assemblies, waters : What flights have in common whatever the multipliers, by environment and
-        by case name; made when first flown.
+    craft : What flights have in common whatever the multipliers.
     """
 
     vehicle: Vehicle
@@ -114,8 +111,7 @@ class Problem:
     chosen: list[Parameter]
     cases: dict[str, tuple[Case, str]]
     channels: list[Channel]
-    assemblies: dict[Environment, Assembly] = field(default_factory=dict)
-    waters: dict[str, Water | None] = field(default_factory=dict)
+    craft: Craft
 
     def without(self, dropped: Callable[[Channel], bool]) -> Problem:
         """The same problem with some of the series left out."""
@@ -128,10 +124,9 @@ class Problem:
         values = apply(self.rows["value"].to_numpy(), self.chosen, theta)
         flown: dict[str, Simulation | None] = {}
         for name, (case, _) in self.cases.items():
-            assembly, water = self._prepared(case)
-            model = equipped(case, self.vehicle, assembly.model(values))
+            model = equipped(case, self.vehicle, self.craft.assembly(case).model(values))
             try:
-                flown[name] = fly(case, self.vehicle, model, water)
+                flown[name] = fly(case, self.vehicle, model, self.craft.water(case))
             except NoEquilibrium:
                 flown[name] = None
         found = []
@@ -142,16 +137,6 @@ class Problem:
             else:
                 found.append(channel.residual(one, self.cases[channel.key[0]][1]))
         return found
-
-    def _prepared(self, case: Case) -> tuple[Assembly, Water | None]:
-        """What the flights of a case have in common; cases in the same water share the assembly."""
-        environment = environment_of(case)
-        if case.name not in self.waters:
-            own = Coefficients(self.vehicle, self.rows)
-            if environment not in self.assemblies:
-                self.assemblies[environment] = Assembly(own, environment)
-            self.waters[case.name] = water_of(case, own)
-        return self.assemblies[environment], self.waters[case.name]
 
 
 @dataclass(frozen=True)
@@ -276,7 +261,7 @@ def problem(
                 raise _refuse(where, training, "channels", channel, known)
             channels.append(_channel(training, reference, case.name, channel, used))
         cases[case.name] = (_flown(held, recorded), reference.abscissa)
-    return Problem(vehicle, rows, chosen, cases, channels)
+    return Problem(vehicle, rows, chosen, cases, channels, Craft(Coefficients(vehicle, rows)))
 
 
 def discrepancies(channels: list[Channel], rms: Sequence[float]) -> Array:

@@ -203,17 +203,18 @@ def _translated(parts: _Parts, rows: int, columns: int) -> tuple[Translation, di
     translation = Translation("boat_type")
     kinds = parts.kinds | {
         "start_zero": Number("d", 0.0),
-        "record": Block("d", (rows, columns)),
-        "executes": Block("d", (_ROOM, 2)),
-        "log": Block("d", (_ROOM, 3)),
+        "log": Several(
+            (Block("d", (rows, columns)), Block("d", (_ROOM, 2)), Block("d", (_ROOM, 3))), maneuver.Log._fields
+        ),
+        "flight": Several(tuple(parts.kinds[k] for k in maneuver.Flight._fields), maneuver.Flight._fields),
         "near": parts.kinds["around"].items[0] if parts.around else Several(()),  # type: ignore[union-attr]
         "dy": Block("d", (12,)),
         "time": Number("d"),
     }
     wanted: dict[str, tuple[Any, str]] = {
-        "hold": (maneuver.hold, "m w g q f y c dt steps around s k stage rate start"),
-        "hold_for": (maneuver.hold_for, "m w g q f y c left h around s k stage rate start"),
-        "run": (maneuver.run, "m w g q f j y c dt steps every around s k stage record executes log start_zero"),
+        "hold": (maneuver.hold, "flight around rate dt steps start"),
+        "hold_for": (maneuver.hold_for, "flight around rate left h start"),
+        "run": (maneuver.run, "flight around log dt steps every start_zero"),
         "fill_rate": (fill_rate, "m w y c near s k dy"),
     }
     if parts.around:

@@ -22,7 +22,8 @@ from sim.boat.row_codec import correlation_matrix
 from sim.boat.vehicle import Vehicle
 from sim.files.errors import InputError
 from sim.flight.case import Case, Series
-from sim.flight.simulate import DERIVED, columns_of, environment_of, equipped, fly, samples_of, uses_tanks, water_of
+from sim.flight.craft import Craft
+from sim.flight.simulate import DERIVED, columns_of, equipped, fly, samples_of, uses_tanks
 from sim.flight.trim import NoEquilibrium
 from sim.kernel.assemble import Assembly
 from sim.kernel.products import product
@@ -168,15 +169,15 @@ class Batch:
 def batch_of(case: Case, vehicle: Vehicle, rows: pd.DataFrame) -> Batch:
     """The batch of a case; raises ``InputError`` when it uses tanks that the vehicle lacks."""
     started = {s: case.started_as(s) for s in (case.reference.compare if case.reference else [])}
-    coefficients = Coefficients(vehicle, rows)
-    assembly = Assembly(coefficients, environment_of(case))
+    craft = Craft(Coefficients(vehicle, rows))
+    assembly = craft.assembly(case)
     equipped(case, vehicle, assembly.model(rows["value"].to_numpy()))
     return Batch(
         flights={"": case} | {s: c for s, c in started.items() if c is not None},
         vehicle=vehicle,
         assembly=assembly,
         channels=(*columns_of(vehicle, uses_tanks(case)), *DERIVED),
-        water=water_of(case, coefficients),
+        water=craft.water(case),
     )
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from threading import RLock
 from typing import TYPE_CHECKING
@@ -13,12 +13,10 @@ from ident.estimates.draft import measured_rows
 from ident.validation.essentials import refuse_without_essentials
 from sim.boat.coefficients import Coefficients
 from sim.boat.database import Version, last_own, read_rows, versions
-from sim.boat.mass import Environment
 from sim.boat.vehicle import Vehicle
 from sim.files.errors import InputError
 from sim.flight.case import Case
-from sim.flight.simulate import environment_of, equipped, water_of
-from sim.kernel.assemble import assemble
+from sim.flight.craft import Craft
 from sim.kernel.layout import Model
 from sim.waves.in_waves import Water
 
@@ -42,20 +40,19 @@ class Boat:
     rows: pd.DataFrame
     commit: Version
     coefficients: Coefficients
-    _models: dict[Environment, Model] = field(default_factory=dict)
-    _lock: RLock = field(default_factory=RLock)
+
+    @cached_property
+    def craft(self) -> Craft:
+        """The boat ready for any case."""
+        return Craft(self.coefficients)
 
     def model(self, case: Case) -> Model:
-        """The model in the environment of a case; raises as ``sim.flight.simulate.equipped``."""
-        environment = environment_of(case)
-        with self._lock:
-            if environment not in self._models:
-                self._models[environment] = assemble(self.coefficients, environment)
-        return equipped(case, self.vehicle, self._models[environment])
+        """The model in the water of a case; raises as ``sim.flight.craft.Craft.model``."""
+        return self.craft.model(case)
 
     def water(self, case: Case) -> Water | None:
-        """Waves and surface of a case around the boat; raises as ``sim.flight.simulate.water_of``."""
-        return water_of(case, self.coefficients)
+        """Waves and surface of a case around the boat; raises as ``sim.flight.craft.Craft.water``."""
+        return self.craft.water(case)
 
 
 def _has_estimates(boat: Boat) -> bool:

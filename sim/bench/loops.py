@@ -37,4 +37,4 @@ def steps(
     near = near_of(around)
     for i in range(states.shape[0]):
         prepare(around, states[i], i * h)
-        step(m, w, states[i], controls[i], rate, h, near, s, k, stage, out)
+        step(m, w, states[i], controls[i], rate, h, near, s, k, stage, False, out)

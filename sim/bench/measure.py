@@ -108,8 +108,11 @@ def ratios(tries: int = 300, say: Callable[[str], None] = lambda text: None) -> 
     plant = Plant(case, coefficients)
     found["plant"] = shortest({"plant": lambda: [plant.step(dH=0.01) for _ in range(_PLANT)]}, tries)["plant"] / _PLANT
     say(f"{FLIGHTS} flights")
+    flight_steps, vehicle = samples_of(case)[0], coefficients.vehicle
+    one_flight = shortest({"flight": lambda: fly(case, vehicle, model, None)}, max(tries // 10, 3))["flight"]
     free = _busy(partial(_voyages, model, states, controls, h), os.cpu_count() or 1)[1]
-    batch, busy = _batch(case, coefficients, model)
+    elapsed, busy = _busy(lambda k: fly(case, vehicle, model, None), FLIGHTS)
+    batch, alone = FLIGHTS * flight_steps / elapsed, flight_steps / one_flight
     return {
         "rhs_us": 1e6 * found["rhs"],
         "rk4_steps_per_s": 1.0 / found["calm"],
@@ -117,21 +120,16 @@ def ratios(tries: int = 300, say: Callable[[str], None] = lambda text: None) -> 
         "numpy_ratio": found["numpy"] / found["rhs"],
         "waves_ratio": found["regular"] / found["calm"],
         "components_ratio": found["components"] / found["calm"],
+        "flight_steps_per_s": alone,
+        "flight_ratio": one_flight / flight_steps / found["calm"],
         "batch_steps_per_s": batch,
-        "batch_efficiency": batch * found["calm"] / (os.cpu_count() or 1),
+        "batch_efficiency": batch / alone / (os.cpu_count() or 1),
         "busy_cores": busy,
         "free_cores": free,
         "plant_step_us": 1e6 * found["plant"],
         "plant_ratio": found["plant"] / found["calm"],
         "cores": os.cpu_count() or 1,
     }
-
-
-def _batch(case: Case, coefficients: Coefficients, model: Model) -> tuple[float, float]:
-    """Steps a second of many flights over all cores, trim and all, and how many cores were busy."""
-    flight_steps, _ = samples_of(case)
-    elapsed, busy = _busy(lambda k: fly(case, coefficients.vehicle, model, None), FLIGHTS)
-    return FLIGHTS * flight_steps / elapsed, busy
 
 
 def _busy(call: Callable[[int], object], times: int) -> tuple[float, float]:

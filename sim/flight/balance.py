@@ -8,11 +8,12 @@ further.
 from __future__ import annotations
 
 from math import cos, sin, sqrt
+from typing import NamedTuple
 
 import numpy as np
 
 from sim.compiled import inner, outer
-from sim.kernel.layout import DIAMETER, HAS_TANKS, HELD, N_PLANES, PHI, SHIFT, THETA, Around, Z
+from sim.kernel.layout import DIAMETER, HAS_TANKS, HELD, N_PLANES, PHI, SHIFT, THETA, Array, Whole, Z
 from sim.kernel.rhs import fill_rate
 
 # Unknowns, and what keeps the boat level.
@@ -26,78 +27,71 @@ _ITERATIONS, _HALVINGS = 30, 12
 _DIFFERENCE, _ROUNDING = 1.5e-8, 1e-15
 
 
-@outer
-def place(
-    m: np.ndarray,
-    w: np.ndarray,
-    x: np.ndarray,
-    speed: float,
-    z: float,
-    mixer: np.ndarray,
-    free: np.ndarray,
-    level: np.ndarray,
-    size: np.ndarray,
-    upright: bool,
-    s: np.ndarray,
-    y: np.ndarray,
-    c: np.ndarray,
-) -> None:
-    """State, controls and shift of the weight that the unknowns mean, into ``y``, ``c`` and ``s``.
+class Search(NamedTuple):
+    """An equilibrium that is looked for, and where its state is left.
 
-    Parameters
+    Attributes
     ----------
-    speed, z : U [m/s], depth of the origin [m]. mixer : (planes, 2).
+    m, w : Model. s, k : Scratch. Floats and whole numbers.
+    speed, z : U [m/s], depth of the origin [m]. mixer : (planes, 2) shares of dV and dH.
     free : (2,) which of ``level`` are unknown. level : (4,) pitch, dV, ballast, trim tank; those
         that are free are set. size : (4,) of one unit of an unknown.
+    upright : Whether the weight is shifted to starboard instead of a heel.
+    y, c, dy : (12,), (controls,) and (12,) state, controls and rate.
+    a : (``SCRATCH``,) of Newton's method.
     """
+
+    m: Array
+    w: Whole
+    s: Array
+    k: Whole
+    speed: float
+    z: float
+    mixer: Array
+    free: Whole
+    level: Array
+    size: Array
+    upright: bool
+    y: Array
+    c: Array
+    dy: Array
+    a: Array
+
+
+@outer
+def place(b: Search, x: np.ndarray) -> None:
+    """State, controls and shift of the weight that the unknowns mean, into the search and its scratch."""
+    level, y, c = b.level, b.y, b.c
     for i in range(2):
-        level[free[i]] = size[free[i]] * x[1 + i]
-    heel, drift, dh, pitch = 0.0 if upright else x[3], x[4], x[5], level[PITCH]
-    s[SHIFT] = x[3] if upright else 0.0
-    u = speed * cos(drift) * cos(pitch)
-    v = speed * sin(drift)
+        level[b.free[i]] = b.size[b.free[i]] * x[1 + i]
+    heel, drift, dh, pitch = 0.0 if b.upright else x[3], x[4], x[5], level[PITCH]
+    b.s[SHIFT] = x[3] if b.upright else 0.0
+    u = b.speed * cos(drift) * cos(pitch)
+    v = b.speed * sin(drift)
     # Level flight: -sin(theta) u + sin(phi) cos(theta) v + cos(phi) cos(theta) w = 0.
     across = (sin(pitch) * u - sin(heel) * cos(pitch) * v) / (cos(heel) * cos(pitch))
-    scale = speed / sqrt(u * u + v * v + across * across)
+    scale = b.speed / sqrt(u * u + v * v + across * across)
     for i in range(y.size):
         y[i] = 0.0
     y[0], y[1], y[2] = u * scale, v * scale, across * scale
-    y[Z], y[PHI], y[THETA] = z, heel, pitch
-    planes = w[N_PLANES]
+    y[Z], y[PHI], y[THETA] = b.z, heel, pitch
+    planes = b.w[N_PLANES]
     for i in range(planes):
-        c[i] = mixer[i, 0] * level[DV] + mixer[i, 1] * dh
-    c[planes] = x[0] * speed / m[DIAMETER]
-    if w[HAS_TANKS]:
+        c[i] = b.mixer[i, 0] * level[DV] + b.mixer[i, 1] * dh
+    c[planes] = x[0] * b.speed / b.m[DIAMETER]
+    if b.w[HAS_TANKS]:
         c[planes + 1], c[planes + 2] = level[BALLAST], level[TRIM_TANK]
 
 
 @outer
-def hold(w: np.ndarray, x: np.ndarray, dy: np.ndarray) -> None:
+def hold(b: Search, x: np.ndarray) -> None:
     """Residuals of held heave, roll and pitch: pitch, heel and dV, which are zero there."""
-    if w[HELD] & 4:
-        dy[2] = x[1]
-    if w[HELD] & 8:
-        dy[3] = x[3]
-    if w[HELD] & 16:
-        dy[4] = x[2]
-
-
-@inner
-def _residuals(
-    m: np.ndarray,
-    w: np.ndarray,
-    x: np.ndarray,
-    y: np.ndarray,
-    c: np.ndarray,
-    near: Around,
-    s: np.ndarray,
-    k: np.ndarray,
-    dy: np.ndarray,
-) -> None:
-    """Accelerations of a state, and what stands for those that are held."""
-    fill_rate(m, w, y, c, near, s, k, dy)
-    if w[HELD]:
-        hold(w, x, dy)
+    if b.w[HELD] & 4:
+        b.dy[2] = x[1]
+    if b.w[HELD] & 8:
+        b.dy[3] = x[3]
+    if b.w[HELD] & 16:
+        b.dy[4] = x[2]
 
 
 @inner
@@ -123,79 +117,71 @@ def _solve(a: np.ndarray) -> bool:
     return True
 
 
+@inner
+def _try(b: Search, x: np.ndarray) -> float:
+    """Accelerations at the unknowns, and what stands for those that are held; the sum of their squares."""
+    place(b, x)
+    fill_rate(b.m, b.w, b.y, b.c, (), b.s, b.k, b.dy)
+    if b.w[HELD]:
+        hold(b, x)
+    total = 0.0
+    for i in range(N_X):
+        total += b.dy[i] * b.dy[i]
+    return total
+
+
+@inner
+def _slopes(b: Search, x: np.ndarray) -> None:
+    """The linear system of Newton's method at the unknowns, whose residuals are in the scratch."""
+    a = b.a
+    for j in range(N_X):
+        kept = x[j]
+        h = _DIFFERENCE * max(abs(kept), 1e-2)
+        x[j] = kept + h
+        h = x[j] - kept
+        _try(b, x)
+        x[j] = kept
+        for i in range(N_X):
+            a[_SYSTEM + (N_X + 1) * i + j] = (b.dy[i] - a[_RESIDUAL + i]) / h
+    for i in range(N_X):
+        a[_SYSTEM + (N_X + 1) * i + N_X] = -a[_RESIDUAL + i]
+        a[_X + i] = x[i]
+
+
+@inner
+def _step_down(b: Search, x: np.ndarray, norm: float) -> bool:
+    """Go along the solution of the system, halved until the residuals fall; false when they do not."""
+    a, share = b.a, 1.0
+    for _ in range(_HALVINGS):
+        for i in range(N_X):
+            x[i] = a[_X + i] + share * a[_SYSTEM + (N_X + 1) * i + N_X]
+        if _try(b, x) < norm:
+            return True
+        share *= 0.5
+    return False
+
+
 @outer
-def balance(
-    m: np.ndarray,
-    w: np.ndarray,
-    x: np.ndarray,
-    speed: float,
-    z: float,
-    mixer: np.ndarray,
-    free: np.ndarray,
-    level: np.ndarray,
-    size: np.ndarray,
-    upright: bool,
-    near: Around,
-    s: np.ndarray,
-    k: np.ndarray,
-    y: np.ndarray,
-    c: np.ndarray,
-    dy: np.ndarray,
-    a: np.ndarray,
-) -> float:
+def balance(b: Search, x: np.ndarray) -> float:
     """Newton's method with halved steps, from ``x``; largest acceleration left at what is found.
 
     Parameters
     ----------
-    x : (6,) start, left at the root. Others as ``place``.
-    near, s, k : Deep, calm water, and the scratch of the model.
-    y, c, dy : (12,), controls and (12,); state, controls and rate of the root.
-    a : (``SCRATCH``,) scratch.
+    x : (6,) start, left at the root, with its state, controls and rate in the search.
     """
-    largest = np.inf
+    a, largest = b.a, np.inf
     # The last step counts when it gains.
     for _ in range(_ITERATIONS):
-        place(m, w, x, speed, z, mixer, free, level, size, upright, s, y, c)
-        _residuals(m, w, x, y, c, near, s, k, dy)
-        norm, largest = 0.0, 0.0
+        norm, largest = _try(b, x), 0.0
         for i in range(N_X):
-            a[_RESIDUAL + i] = dy[i]
-            norm += dy[i] * dy[i]
-            largest = max(largest, abs(dy[i]))
+            a[_RESIDUAL + i] = b.dy[i]
+            largest = max(largest, abs(b.dy[i]))
         if not largest > _ROUNDING:
             return largest if largest == largest else np.inf
-        for j in range(N_X):
-            kept = x[j]
-            h = _DIFFERENCE * max(abs(kept), 1e-2)
-            x[j] = kept + h
-            h = x[j] - kept
-            place(m, w, x, speed, z, mixer, free, level, size, upright, s, y, c)
-            _residuals(m, w, x, y, c, near, s, k, dy)
-            x[j] = kept
-            for i in range(N_X):
-                a[_SYSTEM + (N_X + 1) * i + j] = (dy[i] - a[_RESIDUAL + i]) / h
-        for i in range(N_X):
-            a[_SYSTEM + (N_X + 1) * i + N_X] = -a[_RESIDUAL + i]
-            a[_X + i] = x[i]
-        gained = False
-        if _solve(a):
-            share = 1.0
-            for _ in range(_HALVINGS):
-                for i in range(N_X):
-                    x[i] = a[_X + i] + share * a[_SYSTEM + (N_X + 1) * i + N_X]
-                place(m, w, x, speed, z, mixer, free, level, size, upright, s, y, c)
-                _residuals(m, w, x, y, c, near, s, k, dy)
-                now = 0.0
-                for i in range(N_X):
-                    now += dy[i] * dy[i]
-                if now < norm:
-                    gained = True
-                    break
-                share *= 0.5
-        if not gained:
+        _slopes(b, x)
+        if not (_solve(a) and _step_down(b, x, norm)):
             for i in range(N_X):
                 x[i] = a[_X + i]
-            place(m, w, x, speed, z, mixer, free, level, size, upright, s, y, c)
-            _residuals(m, w, x, y, c, near, s, k, dy)
+            _try(b, x)
             return largest
     return largest

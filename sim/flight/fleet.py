@@ -15,38 +15,33 @@ from sim.files.errors import InputError
 from sim.flight import maneuver, orders
 from sim.flight.case import Case
 from sim.flight.simulate import begun, model_of, water_of
-from sim.kernel.layout import Stage, Work, workspace
+from sim.kernel.layout import workspace
 
 Array = NDArray[np.float64]
 
 
 @outer
 def hold_each(
-    m: np.ndarray,
-    w: np.ndarray,
-    g: np.ndarray,
-    q: np.ndarray,
+    v: maneuver.Flight,
     f: np.ndarray,
     y: np.ndarray,
     c: np.ndarray,
+    rate: np.ndarray,
     dt: float,
     steps: int,
-    s: np.ndarray,
-    k: np.ndarray,
-    stage: Stage,
-    rate: np.ndarray,
     first: int,
     last: int,
 ) -> None:
     """``sim.flight.maneuver.hold`` for boats ``first`` to ``last`` of (n, ...) commands, states and controls."""
     for i in range(first, last):
-        maneuver.hold(m, w, g, q, f[i], y[i], c[i], dt, steps, (), s, k, stage, rate, 0.0)
+        one = maneuver.Flight(v.m, v.w, v.g, v.q, f[i], v.j, y[i], c[i], v.s, v.k, v.stage)
+        maneuver.hold(one, (), rate, dt, steps, 0.0)
 
 
 class _Desk(NamedTuple):
-    """Scratch of one thread."""
+    """Scratch of one thread: a flight whose commands, state and controls are those of no boat."""
 
-    work: Work
+    flight: maneuver.Flight
     rate: Array
 
 
@@ -80,7 +75,6 @@ class FleetPlant:
                 f"case {case.name}", "waves, or a surface in reach", "deep, calm water for many boats at once"
             )
         model, self.start, controls, trim, settings = begun(case, self.vehicle, model_of(case, coefficients))
-        self._model, self._orders = model, orders.flat(settings)
         self._limits = settings.n_limit
         level = (trim.dV, trim.dH) if trim else (0.0, 0.0)
         self._moved, planes = controls, len(self.vehicle.planes)
@@ -92,7 +86,13 @@ class FleetPlant:
         self._given = np.tile(orders.progress(settings, self.start).f, (count, 1))
         self._threads = max(1, min(os.cpu_count() or 1, count))
         self._pool = ThreadPoolExecutor(self._threads)
-        self._desks = [_Desk(workspace(model), np.zeros(controls.size)) for _ in range(self._threads)]
+        self._desks = [
+            _Desk(
+                maneuver.flight_of(model, settings, workspace(model), self.start.copy(), controls.copy()),
+                np.zeros(controls.size),
+            )
+            for _ in range(self._threads)
+        ]
 
     def reset(self, which: NDArray[np.bool_] | None = None) -> None:
         """Back to the start, all or those that are true in a (count,) mask."""
@@ -116,20 +116,5 @@ class FleetPlant:
         return self.state
 
     def _move(self, steps: int, desk: _Desk, first: int, last: int) -> None:
-        model, work = self._model, desk.work
-        hold_each(
-            model.real,
-            model.whole,
-            *self._orders,
-            self._given,
-            self.state,
-            self.controls,
-            self.dt,
-            steps,
-            work.real,
-            work.whole,
-            work.stage,
-            desk.rate,
-            int(first),
-            int(last),
-        )
+        boats = (self._given, self.state, self.controls)
+        hold_each(desk.flight, *boats, desk.rate, self.dt, steps, int(first), int(last))

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.compiled import inner, outer
+from sim.compiled import inlined, inner, outer
 from sim.flight.autopilot import clip, command_boat, move_actuators
 from sim.flight.events import advance, step_past, watch
 from sim.flight.orders import (
@@ -39,7 +39,7 @@ from sim.flight.orders import (
     flat,
     progress,
 )
-from sim.kernel.layout import N_STATES, Around, Model, Stage, workspace
+from sim.kernel.layout import N_STATES, Around, Model, Stage, Whole, Work, workspace
 from sim.kernel.rhs import fill_rate, step
 from sim.waves.surroundings import near_of, prepare, read_gauge
 
@@ -53,7 +53,57 @@ _EVENTS = 256
 _EVENT_TOLERANCE = 1e-10
 
 
-@inner
+class Flight(NamedTuple):
+    """A boat under way, as the compiled loop takes it.
+
+    Attributes
+    ----------
+    m, w : Model. g, q : Settings. f, j : Progress. s, k : Scratch. Floats and whole numbers.
+    y, c : (12,) state and controls.
+    stage : Scratch of a step.
+    """
+
+    m: Array
+    w: Whole
+    g: Array
+    q: Whole
+    f: Array
+    j: Whole
+    y: Array
+    c: Array
+    s: Array
+    k: Whole
+    stage: Stage
+
+
+class Log(NamedTuple):
+    """What a flight writes down.
+
+    Attributes
+    ----------
+    record : (rows, 1 + 12 + controls + 2) time, state, controls, commands of dV and dH.
+    executes : (k, 2) time and command [rad] of each zigzag execute.
+    steps : (k, 3) time, axis and number of each step of a programme that ended.
+    """
+
+    record: Array
+    executes: Array
+    steps: Array
+
+
+def flight_of(model: Model, settings: Settings, work: Work, y: Array, c: Array) -> Flight:
+    """A flight at its start.
+
+    Parameters
+    ----------
+    y, c : (12,) state and controls, which change on the way.
+    """
+    g, q = flat(settings)
+    f, j = progress(settings, y)
+    return Flight(model.real, model.whole, g, q, f, j, y, c, work.real, work.whole, work.stage)
+
+
+@inlined
 def _past_check(g: np.ndarray, q: np.ndarray, y: np.ndarray, sense: float) -> float:
     """Positive once the checked angle has passed the check value of the present leg."""
     if q[LAW + HORIZONTAL] == ZIGZAG:
@@ -63,7 +113,7 @@ def _past_check(g: np.ndarray, q: np.ndarray, y: np.ndarray, sense: float) -> fl
     return -1.0
 
 
-@inner
+@inlined
 def _past(g: np.ndarray, q: np.ndarray, f: np.ndarray, j: np.ndarray, y: np.ndarray, t: float) -> float:
     """Not negative once a zigzag check or an event of a programme has happened."""
     latest = _past_check(g, q, y, f[SENSE])
@@ -74,33 +124,16 @@ def _past(g: np.ndarray, q: np.ndarray, f: np.ndarray, j: np.ndarray, y: np.ndar
 
 
 @inner
-def _cross(
-    m: np.ndarray,
-    w: np.ndarray,
-    g: np.ndarray,
-    q: np.ndarray,
-    f: np.ndarray,
-    j: np.ndarray,
-    y: np.ndarray,
-    c: np.ndarray,
-    rate: np.ndarray,
-    t: float,
-    h: float,
-    near: Around,
-    s: np.ndarray,
-    k: np.ndarray,
-    stage: Stage,
-    trial: np.ndarray,
-) -> float:
+def _cross(v: Flight, near: Around, rate: np.ndarray, t: float, h: float, trial: np.ndarray) -> float:
     """Time into the step from ``t`` at which the first event happens; the state then into ``trial``."""
     low, high = 0.0, h
     while True:
         close = high - low <= _EVENT_TOLERANCE
         middle = high if close else 0.5 * (low + high)
-        step(m, w, y, c, rate, middle, near, s, k, stage, trial)
+        step(v.m, v.w, v.y, v.c, rate, middle, near, v.s, v.k, v.stage, True, trial)
         if close:
             return high
-        if _past(g, q, f, j, trial, t + middle) >= 0.0:
+        if _past(v.g, v.q, v.f, v.j, trial, t + middle) >= 0.0:
             high = middle
         else:
             low = middle
@@ -131,7 +164,7 @@ def _next_steps(
     return logged, ends
 
 
-@inner
+@inlined
 def _is_finite(y: np.ndarray) -> bool:
     total = 0.0
     for i in range(N_STATES):
@@ -139,7 +172,7 @@ def _is_finite(y: np.ndarray) -> bool:
     return total == 0.0
 
 
-@inner
+@inlined
 def _note(f: np.ndarray, y: np.ndarray, c: np.ndarray, time: float, record: np.ndarray, row: int) -> None:
     """Put time, state, controls and the two plane commands into a row of the record."""
     record[row, TIME] = time
@@ -151,160 +184,122 @@ def _note(f: np.ndarray, y: np.ndarray, c: np.ndarray, time: float, record: np.n
         record[row, CONTROLS + c.size + i] = f[COMMAND + i]
 
 
+@inlined
+def _command(v: Flight, around: Around, now: float, dt: float, read: np.ndarray, change: np.ndarray) -> None:
+    """Commands of the sample that begins now; the rate of the state into the start of the next step."""
+    dy = v.stage.start
+    prepare(around, v.y, now)
+    fill_rate(v.m, v.w, v.y, v.c, near_of(around), v.s, v.k, dy)
+    if v.q[N_EVENTS] > 0:
+        watch(v.g, v.q, v.f, v.j, v.y, dy, now)
+    for i in range(N_STATES):
+        read[i], change[i] = v.y[i], dy[i]
+    if v.q[PRESSURE_DEPTH]:
+        read_gauge(around, read, change)
+    command_boat(v.g, v.q, v.f, v.j, read, change, dt)
+
+
+@inlined
+def _turn_over(v: Flight, axis: int, now: float, log: Log, events: int) -> int:
+    """Reverse a zigzag, when it is at its check angle; executes so far."""
+    if _past_check(v.g, v.q, v.y, v.f[SENSE]) < 0.0:
+        return events
+    v.f[SENSE] = -v.f[SENSE]
+    v.f[COMMAND + axis] = v.f[SENSE] * v.g[VALUE + axis]
+    if events < log.executes.shape[0]:
+        log.executes[events, 0], log.executes[events, 1] = now, v.f[COMMAND + axis]
+    return events + 1
+
+
 @outer
 def run(
-    m: np.ndarray,
-    w: np.ndarray,
-    g: np.ndarray,
-    q: np.ndarray,
-    f: np.ndarray,
-    j: np.ndarray,
-    y: np.ndarray,
-    c: np.ndarray,
-    dt: float,
-    steps: int,
-    every: int,
-    around: Around,
-    s: np.ndarray,
-    k: np.ndarray,
-    stage: Stage,
-    record: np.ndarray,
-    executes: np.ndarray,
-    log: np.ndarray,
-    start: float,
+    v: Flight, around: Around, log: Log, dt: float, steps: int, every: int, start: float
 ) -> tuple[int, int, int, float]:
     """Integrate a maneuver.
 
     Parameters
     ----------
-    m, w : Model. g, q : Settings. Floats and whole numbers.
-    f, j : Progress at the start; left as it is at the end.
-    y : (12,) initial state, left final; c : initial controls, left final.
+    v : At the start; progress, state and controls are left as they are at the end.
+    around : Of the workspace.
+    log : Filled with what happens.
     dt : Control sample and integration step [s].
     steps, every : Number of samples, and samples between records.
-    around, s, k, stage : Of a workspace.
-    record : (rows, 1 + 12 + controls + 2) filled with time, state, controls, commands.
-    executes : (k, 2) filled with time and command [rad] of each zigzag execute.
-    log : (k, 3) filled with time, axis and step of each step of a programme that ended.
     start : Time at the start [s]; a run may go on from where another ended.
 
     Returns
     -------
     (rows recorded, executes, steps that ended, time at the end [s]); there may have been more
-    executes and steps than their arrays have room for.
+    executes and steps than the log has room for.
     """
-    dy, trial, read, change = np.empty(N_STATES), np.empty(N_STATES), np.empty(N_STATES), np.empty(N_STATES)
-    rate, near = np.empty(c.size), near_of(around)
-    rows, events, logged, ends = 0, 0, 0, False
-    programmed = q[N_EVENTS] > 0
-    zigzag = q[LAW] == ZIGZAG or q[LAW + 1] == ZIGZAG
-    axis = HORIZONTAL if q[LAW + HORIZONTAL] == ZIGZAG else VERTICAL
+    trial, read, change = np.empty(N_STATES), np.empty(N_STATES), np.empty(N_STATES)
+    rate, near = np.empty(v.c.size), near_of(around)
+    rows, events, ended, ends = 0, 0, 0, False
+    programmed = v.q[N_EVENTS] > 0
+    zigzag = v.q[LAW] == ZIGZAG or v.q[LAW + 1] == ZIGZAG
+    axis = HORIZONTAL if v.q[LAW + HORIZONTAL] == ZIGZAG else VERTICAL
     if zigzag:
-        executes[0, 0], executes[0, 1], events = start, g[VALUE + axis], 1
+        log.executes[0, 0], log.executes[0, 1], events = start, v.g[VALUE + axis], 1
     for sample in range(steps + 1):
         now = start + sample * dt
-        prepare(around, y, now)
-        fill_rate(m, w, y, c, near, s, k, dy)
-        if programmed:
-            watch(g, q, f, j, y, dy, now)
-        for i in range(N_STATES):
-            read[i], change[i] = y[i], dy[i]
-        if q[PRESSURE_DEPTH]:
-            read_gauge(around, read, change)
-        command_boat(g, q, f, j, read, change, dt)
-        if sample % every == 0 and rows < record.shape[0]:
-            _note(f, y, c, now, record, rows)
+        _command(v, around, now, dt, read, change)
+        if sample % every == 0 and rows < log.record.shape[0]:
+            _note(v.f, v.y, v.c, now, log.record, rows)
             rows += 1
-        if sample == steps or not _is_finite(y):
-            return rows, events, logged, now
-        move_actuators(g, q, f, c, dt, rate)
+        if sample == steps or not _is_finite(v.y):
+            return rows, events, ended, now
+        move_actuators(v.g, v.q, v.f, v.c, dt, rate)
         left = dt
         while left > 0.0:
             now, part = start + sample * dt + (dt - left), left
-            step(m, w, y, c, rate, left, near, s, k, stage, trial)
-            happens = (zigzag or programmed) and _past(g, q, f, j, trial, now + left) >= 0.0
+            step(v.m, v.w, v.y, v.c, rate, left, near, v.s, v.k, v.stage, True, trial)
+            happens = (zigzag or programmed) and _past(v.g, v.q, v.f, v.j, trial, now + left) >= 0.0
             if happens:
-                part = _cross(m, w, g, q, f, j, y, c, rate, now, left, near, s, k, stage, trial)
+                part = _cross(v, near, rate, now, left, trial)
             for i in range(N_STATES):
-                y[i] = trial[i]
-            for i in range(c.size):
-                c[i] += part * rate[i]
+                v.y[i] = trial[i]
+            for i in range(v.c.size):
+                v.c[i] += part * rate[i]
             left -= part
             if not happens:
                 continue
             now = start + sample * dt + (dt - left)
-            if zigzag and _past_check(g, q, y, f[SENSE]) >= 0.0:
-                f[SENSE] = -f[SENSE]
-                f[COMMAND + axis] = f[SENSE] * g[VALUE + axis]
-                if events < executes.shape[0]:
-                    executes[events, 0], executes[events, 1] = now, f[COMMAND + axis]
-                events += 1
+            if zigzag:
+                events = _turn_over(v, axis, now, log, events)
             if programmed:
-                logged, ends = _next_steps(g, q, f, j, y, now, log, logged)
+                ended, ends = _next_steps(v.g, v.q, v.f, v.j, v.y, now, log.steps, ended)
                 if ends:
-                    return rows, events, logged, now
-            move_actuators(g, q, f, c, max(left, _EVENT_TOLERANCE), rate)
-            prepare(around, y, now)
-    return rows, events, logged, start + steps * dt
+                    return rows, events, ended, now
+            move_actuators(v.g, v.q, v.f, v.c, max(left, _EVENT_TOLERANCE), rate)
+            prepare(around, v.y, now)
+            fill_rate(v.m, v.w, v.y, v.c, near, v.s, v.k, v.stage.start)
+    return rows, events, ended, start + steps * dt
 
 
 @outer
-def hold_for(
-    m: np.ndarray,
-    w: np.ndarray,
-    g: np.ndarray,
-    q: np.ndarray,
-    f: np.ndarray,
-    y: np.ndarray,
-    c: np.ndarray,
-    left: float,
-    h: float,
-    around: Around,
-    s: np.ndarray,
-    k: np.ndarray,
-    stage: Stage,
-    rate: np.ndarray,
-    start: float,
-) -> bool:
-    """Part of a sample with the commands in ``f`` held.
+def hold_for(v: Flight, around: Around, rate: np.ndarray, left: float, h: float, start: float) -> bool:
+    """Part of a sample with the commands of the flight held.
 
     Parameters
     ----------
+    rate : (controls,) scratch.
     left : Time until the next sample, at which the actuators are where they can be [s].
     h : Step, not longer [s].
-    rate : (controls,) scratch. Others as ``run``.
 
     Returns
     -------
     Whether the state is finite.
     """
-    prepare(around, y, start)
-    move_actuators(g, q, f, c, left, rate)
-    step(m, w, y, c, rate, h, near_of(around), s, k, stage, y)
-    for i in range(c.size):
-        c[i] += h * rate[i]
-    return _is_finite(y)
+    prepare(around, v.y, start)
+    move_actuators(v.g, v.q, v.f, v.c, left, rate)
+    step(v.m, v.w, v.y, v.c, rate, h, near_of(around), v.s, v.k, v.stage, False, v.y)
+    for i in range(v.c.size):
+        v.c[i] += h * rate[i]
+    return _is_finite(v.y)
 
 
 @outer
-def hold(
-    m: np.ndarray,
-    w: np.ndarray,
-    g: np.ndarray,
-    q: np.ndarray,
-    f: np.ndarray,
-    y: np.ndarray,
-    c: np.ndarray,
-    dt: float,
-    steps: int,
-    around: Around,
-    s: np.ndarray,
-    k: np.ndarray,
-    stage: Stage,
-    rate: np.ndarray,
-    start: float,
-) -> float:
-    """Samples with the commands in ``f`` held: ``run`` without autopilot, events and record.
+def hold(v: Flight, around: Around, rate: np.ndarray, dt: float, steps: int, start: float) -> float:
+    """Samples with the commands of the flight held: ``run`` without autopilot, events and record.
 
     Parameters
     ----------
@@ -315,7 +310,7 @@ def hold(
     Time at the end [s]; not a number when the state left the finite numbers.
     """
     for sample in range(steps):
-        if not hold_for(m, w, g, q, f, y, c, dt, dt, around, s, k, stage, rate, start + sample * dt):
+        if not hold_for(v, around, rate, dt, dt, start + sample * dt):
             return np.nan
     return start + steps * dt
 
@@ -353,20 +348,17 @@ def fly_logged(
     room : Executes and ended steps there is room for at first; with more, it is flown once more.
     """
     record = np.zeros((steps // every + 1, CONTROLS + c0.size + 2))
-    g, q = flat(settings)
     work = workspace(model, around)
     while True:
-        executes, log = np.zeros((room, 2)), np.zeros((room, 3))
-        y, c, (f, j) = y0.copy(), c0.copy(), progress(settings, y0)
-        m, w, s, k = model.real, model.whole, work.real, work.whole
-        found = run(m, w, g, q, f, j, y, c, dt, steps, every, around, s, k, work.stage, record, executes, log, 0.0)
-        rows, events, logged, end = found
-        if max(events, logged) <= room:
+        log = Log(record, np.zeros((room, 2)), np.zeros((room, 3)))
+        flight = flight_of(model, settings, work, y0.copy(), c0.copy())
+        rows, executes, ended, end = run(flight, work.around, log, dt, steps, every, 0.0)
+        if max(executes, ended) <= room:
             break
-        room = max(events, logged)
+        room = max(executes, ended)
     flown = record[:rows]
     finite = flown[np.isfinite(flown).all(axis=1)]
-    return Flown(finite, executes[:events], log[:logged], np.append(end, y))
+    return Flown(finite, log.executes[:executes], log.steps[:ended], np.append(end, flight.y))
 
 
 def fly(

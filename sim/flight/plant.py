@@ -15,8 +15,8 @@ from sim.files.errors import InputError
 from sim.flight import maneuver, orders
 from sim.flight.case import Case, load_case
 from sim.flight.commands import Commands, PlaneCommand, SpeedCommand
-from sim.flight.simulate import TANKS, columns_of, initial_state, model_of, settings_of, uses_tanks, water_of
-from sim.kernel.assemble import weight_across
+from sim.flight.craft import Craft
+from sim.flight.simulate import TANKS, begun, columns_of, uses_tanks
 from sim.kernel.layout import workspace
 from sim.waves.in_waves import surroundings
 
@@ -64,16 +64,13 @@ class Plant:
     ----------
     dt : Control sample and integration step [s].
     time : Now [s].
-    state : (12,) u v w p q r [m/s, rad/s], x y z [m], phi theta psi [rad].
-    controls : (planes + 1,) deflections [rad] and n [1/s] as they are; with tanks also ballast
-        [kg] and the shift of the centre of gravity [m].
     commands : dV, dH [rad], n [1/s] and, with tanks, ballast [kg] and trim_tank [m] as last given.
     trim : The equilibrium it starts from, ``sim.flight.trim.Trim``, or None.
 
     Raises
     ------
     InputError
-        As ``sim.flight.simulate.model_of`` and ``water_of``.
+        As ``sim.flight.craft.Craft.model`` and ``water``.
     sim.flight.trim.NoEquilibrium
         When the case starts from self-propulsion and there is none.
 
@@ -90,12 +87,9 @@ class Plant:
 
     def __init__(self, case: Case, coefficients: Coefficients) -> None:
         self.vehicle, self.dt = coefficients.vehicle, case.run.step_s
-        self._case, self._water = _open_loop(case), water_of(case, coefficients)
-        model = model_of(case, coefficients)
-        self._start, self._moved, self.trim = initial_state(case, self.vehicle, model)
-        self._model = weight_across(model, self.trim.lateral) if self.trim and self.trim.lateral else model
-        self._settings = settings_of(self._case, self.vehicle, self._start, self._moved, self.trim)
-        self._orders = orders.flat(self._settings)
+        craft, case = Craft(coefficients), _open_loop(case)
+        self._water, model = craft.water(case), craft.model(case)
+        self._model, self._start, self._moved, self.trim, self._settings = begun(case, self.vehicle, model)
         self._columns = columns_of(self.vehicle, uses_tanks(case))[1:-2]
         self.reset()
 
@@ -137,16 +131,26 @@ class Plant:
         """
         # Start of the present control sample, and what is left of it.
         self._sample, self._left, self.time = 0.0, self.dt, 0.0
-        self.state = _given("state", state, self._start)
-        self.controls = _given("controls", controls, self._moved)
-        planes = len(self.vehicle.planes)
-        level = (self.trim.dV, self.trim.dH) if self.trim else (0.0, 0.0)
-        self.commands = dict(zip(COMMANDS, (*level, *self.controls[planes:].tolist()), strict=False))
-        self._progress, self._rate = orders.progress(self._settings, self.state), np.zeros(self.controls.size)
-        for name in self.commands:
-            self._give(name)
+        y, moved = _given("state", state, self._start), _given("controls", controls, self._moved)
         around = surroundings(self._water, self._model.added_mass) if self._water else ()
         self._work = workspace(self._model, around)
+        self._flight = maneuver.flight_of(self._model, self._settings, self._work, y, moved)
+        planes = len(self.vehicle.planes)
+        level = (self.trim.dV, self.trim.dH) if self.trim else (0.0, 0.0)
+        self.commands = dict(zip(COMMANDS, (*level, *moved[planes:].tolist()), strict=False))
+        self._rate = np.zeros(moved.size)
+        for name in self.commands:
+            self._give(name)
+
+    @property
+    def state(self) -> Array:
+        """(12,) u v w p q r [m/s, rad/s], x y z [m], phi theta psi [rad]; its numbers may be changed."""
+        return self._flight.y
+
+    @property
+    def controls(self) -> Array:
+        """(planes + 1,) deflections [rad] and n [1/s] as they are; with tanks two more [kg, m]."""
+        return self._flight.c
 
     def __getitem__(self, channel: str) -> float:
         """A state, a plane, n, ballast or trim_tank by name; ``t``, ``U`` and ``D0`` too.
@@ -187,24 +191,7 @@ class Plant:
         if self._left != self.dt:
             return self.advance(steps * self.dt, **commands)
         self._take(commands)
-        work, model = self._work, self._model
-        end = maneuver.hold(
-            model.real,
-            model.whole,
-            self._orders[0],
-            self._orders[1],
-            self._progress.f,
-            self.state,
-            self.controls,
-            self.dt,
-            steps,
-            work.around,
-            work.real,
-            work.whole,
-            work.stage,
-            self._rate,
-            self.time,
-        )
+        end = maneuver.hold(self._flight, self._work.around, self._rate, self.dt, steps, self.time)
         if end != end:
             raise FloatingPointError(f"the state left the finite numbers after {self.time:.3f} s")
         self.time = self._sample = end
@@ -232,28 +219,10 @@ class Plant:
         if not (math.isfinite(seconds) and seconds > 0.0):
             raise InputError("plant, seconds", f"{seconds}", "a positive, finite number")
         self._take(commands)
-        work, model = self._work, self._model
         while seconds > _CLOSE * self.dt:
             ends = seconds > self._left - _CLOSE * self.dt
             part = self._left if ends else seconds
-            fine = maneuver.hold_for(
-                model.real,
-                model.whole,
-                self._orders[0],
-                self._orders[1],
-                self._progress.f,
-                self.state,
-                self.controls,
-                self._left,
-                part,
-                work.around,
-                work.real,
-                work.whole,
-                work.stage,
-                self._rate,
-                self.time,
-            )
-            if not fine:
+            if not maneuver.hold_for(self._flight, self._work.around, self._rate, self._left, part, self.time):
                 raise FloatingPointError(f"the state left the finite numbers after {self.time:.3f} s")
             seconds -= part
             if ends:
@@ -285,4 +254,4 @@ class Plant:
         if name == "n":
             low, high = self._settings.n_limit
             value = min(max(value, low), high)
-        self._progress.f[orders.COMMAND + COMMANDS.index(name)] = value
+        self._flight.f[orders.COMMAND + COMMANDS.index(name)] = value

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.flight.balance import DV, SCRATCH, balance, hold, place
+from sim.flight.balance import DV, SCRATCH, Search, balance, hold, place
 from sim.kernel.layout import Model, workspace
 from sim.kernel.rhs import fill_rate
 
@@ -75,27 +75,38 @@ def _solve(
     -------
     The state found and, if it is no equilibrium, what is wrong with it.
     """
-    work, m, w = workspace(model), model.real, model.whole
+    work = workspace(model)
     planes, tanks = mixer.shape[0], len(TANK_NAMES) if model.has_tanks else 0
-    state, derivative, controls = np.zeros(12), np.zeros(12), np.zeros(planes + 1 + tanks)
     # Ballast by what balances 1 % of the weight.
     size = np.array([1.0, 1.0, 0.01 * model.mass, 1.0])
     level = np.array([values[k] for k in _NAMES])
     unknown = np.array([_NAMES.index(k) for k in free])
-    z = depth - model.sail_top
-    boat = (speed, z, np.ascontiguousarray(mixer), unknown, level, size, upright)
+    search = Search(
+        *(model.real, model.whole, work.real, work.whole),
+        speed=float(speed),
+        z=float(depth - model.sail_top),
+        mixer=np.ascontiguousarray(mixer),
+        free=unknown,
+        level=level,
+        size=size,
+        upright=bool(upright),
+        y=np.zeros(12),
+        c=np.zeros(planes + 1 + tanks),
+        dy=np.zeros(12),
+        a=np.zeros(SCRATCH),
+    )
+    state, derivative, controls = search.y, search.dy, search.c
 
     def residual(x: Array) -> Array:
-        place(m, w, x, *boat, work.real, state, controls)
-        fill_rate(m, w, state, controls, (), work.real, work.whole, derivative)
-        hold(w, x, derivative)
+        place(search, x)
+        fill_rate(search.m, search.w, state, controls, (), search.s, search.k, derivative)
+        hold(search, x)
         return derivative[:6].copy()
 
     # n relative to U/D: an advance coefficient near one.
     start = np.array([1.2, 0.0, 0.0, 0.0, 0.0, 0.0])
     x = start.copy()
-    left = balance(m, w, x, *boat, (), work.real, work.whole, state, controls, derivative, np.zeros(SCRATCH))
-    if not left <= _BALANCED:
+    if not balance(search, x) <= _BALANCED:
         # Newton's method gives up at kinks of the tables that a trust region may pass.
         from scipy.optimize import root
 

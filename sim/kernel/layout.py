@@ -26,8 +26,6 @@ Whole = NDArray[np.int64]
 
 # Surroundings of ``sim.waves.surroundings``, or an empty tuple in deep, calm water.
 Around: TypeAlias = Any
-# State, its rate, the sum of rates and the controls within a Runge-Kutta step.
-Stage: TypeAlias = tuple[Array, Array, Array, Array]
 
 # Places in a state.
 U, V, W, P, Q, R, X, Y, Z, PHI, THETA, PSI = range(12)
@@ -74,6 +72,20 @@ MAX_FACTORS = 4
 LOADS, SYSTEM, SHIFT, FEATURES = 0, 8, 50, 56
 N_BOAT, N_PLANE = len(BOAT_FEATURES), len(PLANE_FEATURES)
 FIRST_PLANE = FEATURES + N_BOAT
+
+
+class Stage(NamedTuple):
+    """Scratch of a Runge-Kutta step.
+
+    start : (12,) rate of the state at the start of the step, where it is known already.
+    state, rate, total : (12,) within the step; controls : (planes + 3,) within it.
+    """
+
+    start: Array
+    state: Array
+    rate: Array
+    total: Array
+    controls: Array
 
 
 class _Scalar:
@@ -224,8 +236,8 @@ def workspace(model: Model, around: Around = ()) -> Work:
     count, at = int(w[N_AXES]), int(w[AT_AXES])
     cells = np.zeros(2 * count, dtype=np.int64)
     cells[::2] = w[at : at + AXIS * count].reshape(count, AXIS)[:, 4]
-    controls = int(w[N_PLANES]) + 3
-    stage = (np.zeros(N_STATES), np.zeros(N_STATES), np.zeros(N_STATES), np.zeros(controls))
+    start, state, rate, total = np.zeros((4, N_STATES))
+    stage = Stage(start, state, rate, total, np.zeros(int(w[N_PLANES]) + 3))
     return Work(real, cells, stage, around, features)
 
 

@@ -228,13 +228,18 @@ def step(
     s: np.ndarray,
     k: np.ndarray,
     stage: Stage,
+    begun: bool,
     out: np.ndarray,
 ) -> None:
     """One classical Runge-Kutta step; arguments as ``rk4`` and ``fill_rate``.
 
     With surroundings, ``sim.waves.surroundings.prepare`` comes before the step.
+
+    Parameters
+    ----------
+    begun : Whether ``stage.start`` holds the rate of the state already, a quarter of the work.
     """
-    z, dy, total, moved = stage
+    z, dy, total, moved = stage.state, stage.rate, stage.total, stage.controls
     # One call in a loop: four would be inlined four times, which takes long to compile.
     for part in range(4):
         ahead = h if part == 3 else (0.5 * h if part else 0.0)
@@ -243,7 +248,11 @@ def step(
         for i in range(N_STATES):
             z[i] = y[i] + ahead * dy[i] if part else y[i]
         tick(near, ahead)
-        _rate(m, w, z, moved, near, s, k, dy)
+        if part or not begun:
+            _rate(m, w, z, moved, near, s, k, dy)
+        else:
+            for i in range(N_STATES):
+                dy[i] = stage.start[i]
         twice = 2.0 if part == 1 or part == 2 else 1.0
         for i in range(N_STATES):
             total[i] = total[i] + twice * dy[i] if part else dy[i]
@@ -287,4 +296,4 @@ def rk4(model: Model, y: np.ndarray, c: np.ndarray, rate: np.ndarray, h: float, 
     c, rate : Controls at the start and their rates.
     h : Step [s].
     """
-    step(model.real, model.whole, y, c, rate, h, near_of(work.around), work.real, work.whole, work.stage, out)
+    step(model.real, model.whole, y, c, rate, h, near_of(work.around), work.real, work.whole, work.stage, False, out)

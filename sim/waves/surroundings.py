@@ -46,6 +46,8 @@ WAVES, DRIFT, WIDTH, WANTED, N_STATIONS, N_CELLS, N_SECTIONS = range(7)
 SPEEDS, HEADINGS, DEPTHS = 7, 8, 9
 AT_VALUE, AT_SLOPE, AT_CELLS, AT_DRIFT, AT_PARTS, AT_SECTIONS, AT_DRY = range(10, 17)
 PLACES = 17
+# Times of a flight that differ by less are one [s].
+_SAME_TIME = 1e-9
 
 
 class Near(NamedTuple):
@@ -149,10 +151,10 @@ def prepare(around: Around, y: Array, time: float) -> None:
     """Make the surroundings ready for a step that starts at ``y`` [SI] and ``time`` [s]."""
     a = around.near.a
     a[START] = a[NOW] = time
-    a[FOUND_AT] = -1.0
     # Sums that still cover the time are left alone here: handing them over takes as long as a step.
     covered = a[SPAN_START] <= time < a[SPAN_END] - 1e-9 * (a[SPAN_END] - a[SPAN_START])
     if around.near.b[WAVES] and not covered:
+        a[FOUND_AT] = -1.0
         wave_passage.advance(around.sea, y, time, around.sums)
 
 
@@ -186,8 +188,8 @@ def observe(near: Around, y: Array) -> None:
     for i in range(12):
         a[FELT + i] = y[i]
     if b[WAVES]:
-        # Two stages of a step are at the same time.
-        if a[FOUND_AT] != a[NOW]:
+        # Two stages of a step are at the same time, and the next step begins where one ends.
+        if abs(a[FOUND_AT] - a[NOW]) > _SAME_TIME:
             span = (a[SPAN_START], a[SPAN_END])
             blend(a, span[0], span[1], b[AT_VALUE], b[AT_SLOPE], b[WIDTH], a[NOW], 0, b[WANTED], a, FOUND)
             a[FOUND_AT] = a[NOW]
