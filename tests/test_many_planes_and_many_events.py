@@ -39,7 +39,7 @@ def test_a_step_of_a_boat_with_many_planes_is_that_of_the_plain_right_hand_side(
     c = np.append(rng.uniform(-0.2, 0.2, count), 1.2)
     rate, out = np.append(rng.uniform(-0.05, 0.05, count), 0.01), np.zeros(12)
     work = workspace(model)
-    guard = work.stage[3].size
+    guard = work.stage.controls.size
     kernel.rk4(model, y, c, rate, 0.05, work, out)
     assert guard >= c.size
     assert out == pytest.approx(_classical(model, y, c, rate, 0.05), rel=1e-12, abs=1e-13)
