@@ -63,7 +63,6 @@ def test_every_bundled_vehicle_can_be(name):
         ("leading_edge = [-1, 0, 0]", "leading_edge = [0, 1, -1]", "stern_plane_1, span_axis"),
         ("span_axis = [0, 1, -1]", "span_axis = [0.3, 1, -1]", "stern_plane_1, span_axis"),
         ("rate_degps = 7.11", "rate_degps = 7.11e9", "stern_plane_1, rate_degps"),
-        ("mixer = { dV = -1, dH = -1 }", "mixer = { dV = 0, dH = 0 }", "stern_plane_1, mixer"),
         ("limit_deg = 30.0", "limit_deg = 3000.0", "stern_plane_1, limit_deg"),
         ('name = "Hull 2"', 'name = "Hull 1"', "planes and sections"),
     ],

@@ -146,12 +146,6 @@ def _plane(plane: Any, vehicle: Any) -> Iterator[tuple[str, str, str]]:
         yield f"{key}, limit_deg", f"{plane.limit_deg:g}", "90 at most"
     if plane.rate_degps > _FASTEST_PLANE:
         yield f"{key}, rate_degps", f"{plane.rate_degps:g}", f"{_FASTEST_PLANE:g} at most"
-    if plane.mixer.dV == 0.0 and plane.mixer.dH == 0.0:
-        yield (
-            f"{key}, mixer",
-            "no share of any command",
-            "a share of dV or dH that is not zero: the plane would never move",
-        )
     partner = next(p for p in vehicle.planes if p.name == plane.mirror)
     if partner.mirror != plane.name:
         yield f"{key}, mirror", f"{plane.mirror!r}, which mirrors {partner.mirror!r}", "planes that mirror each other"
