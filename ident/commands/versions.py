@@ -51,7 +51,7 @@ def report(
     done = []
     for name in [vehicle] if vehicle else reported_vehicles(db, version):
         with console.status(f"drawing every coefficient of {on_screen(name)}"):
-            done.append(write_report(db, version, out, name, interactive, beside))
+            done.append(write_report(db, version, out, name, interactive, beside, workers=0))
         console.print(f"report: {on_screen(done[-1]['file'])}", highlight=False)
     if json_path:
         emit(done[0] if len(done) == 1 else done, json_path)

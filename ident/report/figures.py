@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
+from ident.drawing import beside, fixed_labels, margins, scientific
 from ident.text import in_figure
 from sim.boat import catalogue
 from sim.boat.catalogue import Term
@@ -158,17 +159,22 @@ def _shade(i: int, count: int) -> str:
 
 
 def _points(axes: Axes, x: Any, rows: pd.DataFrame, marker: str, colours: dict[str, str]) -> None:
-    """Points with error bars, filled when measured and hollow when mirrored."""
-    zero = rows["origin"] == "symmetry"
-    if zero.any():
-        axes.plot(x[zero], rows["value"][zero], "x", color=_SYMMETRY, markersize=4.5, zorder=4)
-    rows, x = rows[~zero], x[~zero]
-    if rows.empty:
-        return
+    """Points, filled when measured and hollow when mirrored."""
     edges: Any = [colours.get(q, _SYMMETRY) for q in rows["quality"]]
     faces = [e if o == "measured" else "white" for e, o in zip(edges, rows["origin"], strict=True)]
-    axes.errorbar(x, rows["value"], yerr=rows["stderr"], fmt="none", ecolor=edges, elinewidth=0.9, zorder=3)
     axes.scatter(x, rows["value"], s=15, marker=marker, facecolors=faces, edgecolors=edges, linewidths=0.9, zorder=3)
+
+
+def _error_bars(axes: Axes, column: str, rows: pd.DataFrame, colours: dict[str, str]) -> None:
+    """Standard errors of all lines of a panel, and crosses where symmetry says zero."""
+    zero = rows["origin"] == "symmetry"
+    if zero.any():
+        axes.plot(rows[column][zero], rows["value"][zero], "x", color=_SYMMETRY, markersize=4.5, zorder=4)
+    rows = rows[~zero]
+    if not rows.empty:
+        edges = [colours.get(q, _SYMMETRY) for q in rows["quality"]]
+        low, high = rows["value"] - rows["stderr"], rows["value"] + rows["stderr"]
+        axes.vlines(rows[column], low, high, colors=edges, linewidth=0.9, zorder=3)
 
 
 def _draw_curve(axes: Axes, panel: Panel, lines: dict[str, list[float]], colours: dict[str, str]) -> None:
@@ -180,15 +186,20 @@ def _draw_curve(axes: Axes, panel: Panel, lines: dict[str, list[float]], colours
         i = known.index(float(str(key))) if panel.line else 0
         group = group.sort_values(axis.column)
         axes.plot(group[axis.column], group["value"], "-", color=_shade(i, len(known)), linewidth=1.0, zorder=2)
-        _points(axes, group[axis.column], group, _MARKERS[i % len(_MARKERS)], colours)
+        measured = group[group["origin"] != "symmetry"]
+        if not measured.empty:
+            _points(axes, measured[axis.column], measured, _MARKERS[i % len(_MARKERS)], colours)
+    _error_bars(axes, axis.column, panel.rows, colours)
     unit = "" if axis.unit == "1" else f" [{axis.unit}]"
     axes.set_xlabel(f"{axis.name}{unit}")
     axes.set_ylabel(f"{panel.ylabel} [-]")
     low, high = axes.get_ylim()
     if low < 0.0 < high:
         axes.axhline(0.0, color="#aaaaaa", linewidth=0.7, zorder=1)
-    axes.ticklabel_format(axis="both", style="sci", scilimits=(-2, 3), useMathText=True)
-    axes.locator_params(axis="x", nbins=7)
+    scientific(axes.xaxis, axes.yaxis)
+    # Ticks are most of the time of a panel.
+    axes.locator_params(axis="x", nbins=6)
+    axes.locator_params(axis="y", nbins=5)
 
 
 def _draw_bars(axes: Axes, panel: Panel, colours: dict[str, str]) -> None:
@@ -206,7 +217,7 @@ def _draw_bars(axes: Axes, panel: Panel, colours: dict[str, str]) -> None:
     axes.set_ylim(len(rows) - 0.4 if len(rows) > 1 else 0.6, -0.6)
     axes.axvline(0.0, color="#aaaaaa", linewidth=0.7)
     axes.set_xlabel(f"{panel.ylabel} [-]" if panel.labels == "part" else "value [-]")
-    axes.ticklabel_format(axis="x", style="sci", scilimits=(-2, 3), useMathText=True)
+    scientific(axes.xaxis)
     axes.locator_params(axis="x", nbins=5)
 
 
@@ -271,14 +282,7 @@ def _frame(rows: int, columns: int, panels: list[Panel], entries: int) -> tuple[
     width = left + 0.15 + 2.9 * columns + between * (columns - 1)
     height = top + bottom + tall * rows + gap * (rows - 1)
     figure = Figure(figsize=(width, height))
-    figure.subplots_adjust(
-        left=left / width,
-        right=1.0 - 0.15 / width,
-        top=1.0 - top / height,
-        bottom=bottom / height,
-        wspace=between / 2.9,
-        hspace=gap / tall,
-    )
+    margins(figure, rows, columns, left=left, top=top, bottom=bottom, between=between, gap=gap)
     return figure, figure.subplots(rows, columns, squeeze=False)
 
 
@@ -297,7 +301,8 @@ def _draw(panels: list[Panel], title: str, stamp: str, colours: dict[str, str]) 
             axes = grid[place]
             axes.set_visible(True)
             # The power of ten stands at the left, so the title goes to the right.
-            axes.set_title(in_figure(panel.title), loc="right")
+            axes.set_title(in_figure(panel.title), loc="right", y=1.0)
+            fixed_labels(axes, 0.42, 0.27)
             if panel.x is None:
                 _draw_bars(axes, panel, colours)
             else:
@@ -311,7 +316,9 @@ def _draw(panels: list[Panel], title: str, stamp: str, colours: dict[str, str]) 
     return "data:image/svg+xml;base64," + base64.b64encode(stream.getvalue()).decode()
 
 
-def draw_figures(vehicle: Vehicle, rows: pd.DataFrame, colours: dict[str, str], version: int) -> list[Picture]:
+def draw_figures(
+    vehicle: Vehicle, rows: pd.DataFrame, colours: dict[str, str], version: int, workers: int = 1
+) -> list[Picture]:
     """Every coefficient of one vehicle, drawn.
 
     Parameters
@@ -320,6 +327,7 @@ def draw_figures(vehicle: Vehicle, rows: pd.DataFrame, colours: dict[str, str], 
     rows : Its database rows.
     colours : From ``quality_colours``.
     version : Database version, printed on each figure with vehicle and frame.
+    workers : Processes that draw; 0 for all cores. The pictures do not depend on it.
 
     Returns
     -------
@@ -327,16 +335,15 @@ def draw_figures(vehicle: Vehicle, rows: pd.DataFrame, colours: dict[str, str], 
     """
     order = {name: i for i, name in enumerate(vehicle.part_names())}
     rows = rows.sort_values("part", key=lambda part: part.map(order), kind="stable")
-    found = []
     stamp = f"{vehicle.name}, database version {version}; program frame: {PROGRAM}"
+    named, jobs = [], []
     for (group, part, x), panels in _group(vehicle_terms(vehicle), rows).items():
         title = group.capitalize() if part in ("hull", "propeller", "sections") else f"{group.capitalize()}: {part}"
         if x and x != "delta":
             title += f" against {x}"
-        names: list[str] = []
-        for panel in panels:
-            names += list(panel.rows["coefficient"])
         anchor = "fig-" + "-".join(w for w in (group, part, x) if w).replace(" ", "-").lower()
-        caption = ", ".join(dict.fromkeys(names))
-        found.append(Picture(anchor, title, caption, _draw(panels, title, stamp, colours)))
-    return found
+        caption = ", ".join(dict.fromkeys(name for panel in panels for name in panel.rows["coefficient"]))
+        named.append((anchor, title, caption))
+        jobs.append((panels, title, stamp, colours))
+    images = beside(_draw, jobs, workers)
+    return [Picture(*words, image) for words, image in zip(named, images, strict=True)]

@@ -182,13 +182,13 @@ def _vocabulary(metadata: dict[str, str], rows: pd.DataFrame) -> list[dict[str, 
 def _calibration(commit: Version, vehicle: Vehicle, number: int) -> dict[str, Any] | None:
     """What the version was calibrated with, with verdicts and a figure; None for captive versions."""
     from ident.calibration.figure import prior_and_posterior
-    from ident.calibration.version import verdict
+    from ident.calibration.result import Group
 
     found = _stored(commit.metadata, "calibration", {})
     if not found:
         return None
     stamp = f"{vehicle.name}, database version {number}; program frame: {PROGRAM}"
-    groups = [g | {"verdict": verdict(g)} for g in found["groups"]]
+    groups = [g | {"verdict": Group.of(g).verdict} for g in found["groups"]]
     return found | {"groups": groups, "figure": prior_and_posterior(found, stamp)}
 
 
@@ -215,7 +215,9 @@ def _errata(vehicle: Vehicle) -> list[dict[str, str]]:
         raise InputError(vehicle.errata, f"cannot be read: {error}", "a CSV file in UTF-8") from error
 
 
-def _content(db: str, number: int, vehicle: Vehicle, rows: pd.DataFrame, commit: Version) -> dict[str, Any]:
+def _content(
+    db: str, number: int, vehicle: Vehicle, rows: pd.DataFrame, commit: Version, workers: int
+) -> dict[str, Any]:
     """Everything the template shows."""
     from markupsafe import Markup
 
@@ -224,7 +226,7 @@ def _content(db: str, number: int, vehicle: Vehicle, rows: pd.DataFrame, commit:
     coverage = _coverage(vehicle, rows, {q["word"]: q["factor"] or 1.0 for q in vocabulary})
     columns = {a: c for c, a in axis_columns().items()}
     combined = (rows[columns["alpha"]].fillna(0.0) != 0.0) & (rows[columns["beta"]].fillna(0.0) != 0.0)
-    pictures = draw_figures(vehicle, rows, colours, number)
+    pictures = draw_figures(vehicle, rows, colours, number, workers)
     runs = runs_of(rows, commit)
     pages = term_pages(vehicle_terms(vehicle), rows, pictures, runs)
     return {
@@ -286,7 +288,13 @@ def _drawn(db: str, number: int, vehicle: str) -> tuple[pd.DataFrame, dict[str, 
 
 
 def write_report(
-    db: str, version: int | None, out: Path, vehicle: str, interactive: bool = False, beside: Sequence[int] = ()
+    db: str,
+    version: int | None,
+    out: Path,
+    vehicle: str,
+    interactive: bool = False,
+    beside: Sequence[int] = (),
+    workers: int = 1,
 ) -> dict[str, Any]:
     """Write the report of one vehicle at one database version.
 
@@ -298,6 +306,7 @@ def write_report(
     vehicle : Bundled name or path to a vehicle file.
     interactive : Write a page with figures to turn and slice beside it, ``<vehicle>_v<version>_interactive.html``.
     beside : Other versions drawn in the interactive figures.
+    workers : Processes that draw the figures; 0 for all cores. The page does not depend on it.
 
     Returns
     -------
@@ -325,7 +334,7 @@ def write_report(
     if interactive:
         shown = [Drawn(n, *_drawn(db, n, boat.name)) for n in dict.fromkeys((number, *beside))]
         write_interactive(boat, shown, page_of_figures, path.name)
-    content = _content(db, number, boat, rows, commit) | {"interactive": page_of_figures.name if interactive else ""}
+    content = _content(db, number, boat, rows, commit, workers) | {"interactive": page_of_figures.name if interactive else ""}
     page = templates.get_template("report.html.j2").render(content)
     with whole(path) as part:
         part.write_text(page, encoding="utf-8")

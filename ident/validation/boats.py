@@ -46,6 +46,10 @@ class Boat:
         """The boat ready for any case."""
         return Craft(self.coefficients)
 
+    def __reduce__(self) -> tuple[type[Boat], tuple[Vehicle, pd.DataFrame, Version, Coefficients]]:
+        # Into another process without its lock; models are assembled again where they are needed.
+        return type(self), (self.vehicle, self.rows, self.commit, self.coefficients)
+
     def model(self, case: Case) -> Model:
         """The model in the water of a case; raises as ``sim.flight.craft.Craft.model``."""
         return self.craft.model(case)

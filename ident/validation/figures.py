@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ident.drawing import fixed_labels, margins
 from ident.output import whole
 from ident.text import in_figure
 from ident.validation.bands import Bands
@@ -65,6 +66,8 @@ _SHOWN = {
     "self_propulsion": ("n", "theta", "D0", "ballast"),
 }
 _DEFAULT = ("psi", "theta", "phi", "u", "D0", "r")
+# Room below the panels for the abscissa and two lines of legend [inches].
+_LEGEND = 0.95
 
 
 def _shown(values: Array, unit: str) -> tuple[Array, str]:
@@ -133,18 +136,15 @@ def _series(done: Validation, channel: str, axis: Any, bands: Bands | None) -> N
         axis.invert_yaxis()
 
 
-def pyplot() -> Any:
-    """Matplotlib's pyplot, drawing to files."""
-    import matplotlib as mpl
+def blank(width: float, height: float) -> Any:
+    """An empty figure of a size [inches], drawn to a file."""
+    from matplotlib.figure import Figure
 
-    mpl.use("Agg")
-    import matplotlib.pyplot as plt
-
-    return plt
+    return Figure(figsize=(width, height))
 
 
 def finish(figure: Any, path: Path, title: str, stamp: str) -> Path:
-    """Put title, database version and frame on top, write and close.
+    """Put title, database version and frame on top and write.
 
     Parameters
     ----------
@@ -155,10 +155,10 @@ def finish(figure: Any, path: Path, title: str, stamp: str) -> Path:
     -------
     ``path``.
     """
-    figure.suptitle(f"{in_figure(title)}\n{in_figure(stamp)}; {FRAME}", fontsize=10)
+    top = 1.0 - 0.08 / figure.get_figheight()
+    figure.suptitle(f"{in_figure(title)}\n{in_figure(stamp)}; {FRAME}", fontsize=10, y=top)
     with whole(path) as part:
         figure.savefig(part, dpi=120)
-    pyplot().close(figure)
     return path
 
 
@@ -166,6 +166,7 @@ def dress(axis: Any, x: str, y: str) -> None:
     """Name the axes of a panel, with a grid."""
     axis.set_xlabel(x)
     axis.set_ylabel(y)
+    fixed_labels(axis, 0.5, 0.3)
     axis.grid(alpha=0.3)
 
 
@@ -234,15 +235,18 @@ def _grid(done: Validation, axes: Any) -> None:
         )
 
 
-def _draw(done: Validation, plt: Any, bands: Bands | None) -> tuple[Any, Any]:
+def _draw(done: Validation, bands: Bands | None) -> tuple[Any, Any]:
     """The figure, and the axis that has every label."""
     kind = done.case.maneuver or ""
     if done.grid:
-        figure, axes = plt.subplots(2, 2, figsize=(11, 7), layout="constrained")
+        figure = blank(11, 7)
+        margins(figure, 2, 2, bottom=_LEGEND)
+        axes = figure.subplots(2, 2)
         _grid(done, np.ravel(axes))
         return figure, np.ravel(axes)[0]
     if kind in ("turning_circle", "direct_spiral", "reverse_spiral"):
-        figure = plt.figure(figsize=(13, 7), layout="constrained")
+        figure = blank(13, 7)
+        margins(figure, 2, 4, bottom=_LEGEND)
         spec = figure.add_gridspec(2, 4)
         main = figure.add_subplot(spec[:, :2])
         _track(done, main) if kind == "turning_circle" else _spiral(done, main)
@@ -255,7 +259,9 @@ def _draw(done: Validation, plt: Any, bands: Bands | None) -> tuple[Any, Any]:
     planes = [c for c in done.simulation.columns if c not in CHANNELS and c not in _NO_PLANES]
     panels = len(channels) + bool(planes)
     rows, columns = (panels + 1) // 2, min(2, panels)
-    figure, axes = plt.subplots(rows, columns, figsize=(11, 2.7 * rows + 0.8), layout="constrained")
+    figure = blank(11, 2.7 * rows + 0.8)
+    margins(figure, rows, columns, bottom=_LEGEND)
+    axes = figure.subplots(rows, columns)
     for channel, axis in zip(channels, np.ravel(axes), strict=False):
         _series(done, channel, axis, bands)
         _checks(done, channel, axis)
@@ -295,7 +301,7 @@ def case_figure(done: Validation, path: Path, bands: Bands | None = None) -> Pat
     -------
     ``path``.
     """
-    figure, labelled = _draw(done, pyplot(), bands)
+    figure, labelled = _draw(done, bands)
     handles, labels = labelled.get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=4, frameon=False)
+    figure.legend(handles, labels, loc="lower center", ncols=4, frameon=False)
     return finish(figure, path, f"{done.case.title}, {done.case.vehicle}", version_words(done.database))

@@ -5,14 +5,26 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
-import pandas as pd
-
 from ident.metrics import seaway
 from ident.metrics.in_waves import BROACHING
 from ident.text import in_file_name
+from ident.validation.figures import case_figure
 from ident.validation.result import Validation
 from ident.validation.wave_figures import exceedance_figure, harmonics_figure, seaway_figure, spectrum_figure
 from sim.boat.database import version_words
+
+
+def figures_of(done: Validation, folder: Path, kind: str = "png") -> list[Path]:
+    """Every figure of a flown case: its own, and further ones in an irregular sea.
+
+    Parameters
+    ----------
+    done : A flown case, drawn with its error bands where it has them.
+    folder : Where to write.
+    kind : Suffix of the files.
+    """
+    own = folder / f"{in_file_name(done.case.name)}_v{done.version}.{kind}"
+    return [case_figure(done, own, done.bands), *sea_figures(done, folder, kind)]
 
 
 def sea_figures(done: Validation, folder: Path, kind: str = "png") -> list[Path]:
@@ -64,6 +76,8 @@ def harmonics_over_depth(done: list[Validation], folder: Path, kind: str = "png"
 
 def _over_depth(done: list[Validation], folder: Path, suffix: str, kind: str) -> Path:
     """The figure of one vehicle in one wave."""
+    import pandas as pd
+
     metric = {"dz1_over_aw": "dz1_over_aw", "theta1_deg": "theta1"}
     rows = [
         {"source": p.source, "channel": metric[p.metric], "D0_m": d.case.initial.depth_m}

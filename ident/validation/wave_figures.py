@@ -10,11 +10,12 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from ident.drawing import margins
 from ident.metrics.exceedance import Side, exceedances, rice_rate
 from ident.metrics.seakeeping import Harmonics, as_published
 from ident.metrics.seaway import Statistics, spectrum, uniform_step
 from ident.text import in_figure
-from ident.validation.figures import DOWNWARDS, dress, finish, pyplot, readable
+from ident.validation.figures import DOWNWARDS, blank, dress, finish, readable
 from sim.flight.simulate import Simulation
 
 Array = NDArray[np.float64]
@@ -60,9 +61,9 @@ def seaway_figure(
     -------
     ``path``.
     """
-    plt = pyplot()
-    size = (11, 2.1 * len(found) + 1.4)
-    figure, axes = plt.subplots(len(found), 1, figsize=size, sharex=True, squeeze=False, layout="constrained")
+    figure = blank(11, 2.1 * len(found) + 1.4)
+    margins(figure, len(found), 1, top=0.85, gap=0.3)
+    axes = figure.subplots(len(found), 1, sharex=True, squeeze=False)
     for (channel, one), axis in zip(found.items(), axes[:, 0], strict=True):
         values, name, unit = readable(channel, simulation[channel])
         trend, sigma = readable(channel, one.trend)[0], readable(channel, np.array(one.sigma))[0]
@@ -113,7 +114,6 @@ def spectrum_figure(
     -------
     ``path``.
     """
-    plt = pyplot()
     time, eta = elevation
     first = next(iter(found.values()))
     waves = spectrum(eta, uniform_step(time), first.spectrum.resolution)
@@ -121,7 +121,9 @@ def spectrum_figure(
     for channel, one in found.items():
         one_unit, name, unit = readable(channel, np.ones(1))
         panels.append((name, unit, one.spectrum, float(one_unit[0]) ** 2, "tab:red", one.rice_period))
-    figure, axes = plt.subplots(len(panels), 1, figsize=(9, 1.9 * len(panels) + 1.2), sharex=True, layout="constrained")
+    figure = blank(9, 1.9 * len(panels) + 1.2)
+    margins(figure, len(panels), 1, top=0.85, gap=0.4)
+    axes = figure.subplots(len(panels), 1, sharex=True)
     for (name, unit, own, scale, colour, period), axis in zip(panels, axes, strict=True):
         axis.plot(own.frequency, scale * own.density, color=colour, lw=1.3)
         axis.fill_between(own.frequency, scale * own.density, color=colour, alpha=0.15, lw=0)
@@ -129,7 +131,7 @@ def spectrum_figure(
         words = f"{name}: $4\\sqrt{{m_0}}$ = {4.0 * m0**0.5:.3g} {unit}"
         words += f", $2\\pi\\sqrt{{m_0/m_2}}$ = {period:.3g} s" if period else ""
         axis.set_title(
-            f"{words}; resolution {own.resolution:.2g} rad/s, {own.segments} segments", loc="left", fontsize=9
+            f"{words}; resolution {own.resolution:.2g} rad/s, {own.segments} segments", loc="left", fontsize=9, y=1.0
         )
         dress(axis, "", rf"S [{unit}$^2$ s/rad]")
         axis.set_ylim(bottom=0.0)
@@ -155,7 +157,6 @@ def exceedance_figure(
     -------
     ``path``.
     """
-    plt = pyplot()
     sense = -1.0 if side == "below" else 1.0
     largest = float((sense * (found.trend + found.deviation - found.mean)).max())
     reach = max(_BEYOND * found.sigma, 1.05 * largest)
@@ -165,7 +166,9 @@ def exceedance_figure(
     each = exceedances(found, list(levels), side)
     shown, name, unit = readable(found.channel, levels)
     rate, error = np.array([e.predicted for e in each]), np.array([e.predicted_stderr for e in each])
-    figure, axis = plt.subplots(figsize=(8, 5.4), layout="constrained")
+    figure = blank(8, 5.4)
+    margins(figure, 1, 1)
+    axis = figure.subplots()
     axis.semilogy(shown, rate, color="tab:blue", lw=1.4, label=r"Rice, from $m_0$ and $m_2$")
     factor = np.exp(2.0 * error / rate)
     axis.fill_between(
@@ -217,8 +220,9 @@ def harmonics_figure(
     -------
     ``path``.
     """
-    plt = pyplot()
-    figure, axes = plt.subplots(1, 2, figsize=(10, 4.8), layout="constrained")
+    figure = blank(10, 4.8)
+    margins(figure, 1, 2, bottom=0.95)
+    axes = figure.subplots(1, 2)
     depths = sorted(flown)
     for channel, axis in zip(_LABEL_OF, axes, strict=True):
         own = [(d, *as_published(flown[d])[channel]) for d in depths if channel in as_published(flown[d])]
@@ -234,5 +238,5 @@ def harmonics_figure(
         axis.margins(0.08)
         axis.set_ylim(bottom=0.0)
         axis.set_xlim(left=0.0)
-    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=4, frameon=False)
+    figure.legend(*axes[0].get_legend_handles_labels(), loc="lower center", ncols=4, frameon=False)
     return finish(figure, path, title, stamp)

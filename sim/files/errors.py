@@ -31,6 +31,16 @@ class InputError(Exception):
         super().__init__(f"{where}: {found} (allowed: {allowed})")
         self.where, self.found, self.allowed = where, found, allowed
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        # From one process to another with all that it says, and of whatever kind it is.
+        return _again, (type(self), self.args, dict(self.__dict__))
+
+
+def _again(kind: type[InputError], args: tuple[Any, ...], state: dict[str, Any]) -> InputError:
+    error = kind.__new__(kind, *args)
+    error.__dict__.update(state)
+    return error
+
 
 def _known(kind: type[BaseModel], place: tuple[int | str, ...]) -> list[str]:
     """Keys of the part of a file that a pydantic location without its last entry leads to."""

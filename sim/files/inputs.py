@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterable
 from contextvars import ContextVar
 from pathlib import Path
 
@@ -13,9 +14,20 @@ _LARGEST_STATEMENT = 1 << 24
 _read: ContextVar[set[Path] | None] = ContextVar("files a command has read", default=None)
 
 
-def begin() -> None:
-    """From here on files are noted; without it, as in a program of the user's own, they are not."""
-    _read.set(set())
+def begin(read: Iterable[Path] = ()) -> None:
+    """From here on files are noted; without it, as in a program of the user's own, they are not.
+
+    Parameters
+    ----------
+    read : Files that count as read already: in a process that works for another.
+    """
+    _read.set(set(read))
+
+
+def noted() -> frozenset[Path] | None:
+    """The files read since ``begin``; None without it."""
+    files = _read.get()
+    return None if files is None else frozenset(files)
 
 
 def note(path: Path) -> None:
