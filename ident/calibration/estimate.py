@@ -22,7 +22,6 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
-from scipy.optimize import least_squares, minimize_scalar
 
 from ident.calibration.file import CalibrationFile, Parameter, Training, apply
 from ident.validation.references import check_reference
@@ -275,6 +274,8 @@ def discrepancies(channels: list[Channel], rms: Sequence[float]) -> Array:
     -------
     (series,) in the units of the references.
     """
+    from scipy.optimize import minimize_scalar
+
     own = np.array([c.reading**2 + c.against**2 for c in channels])
     square, count = np.square(rms), np.array([c.pieces for c in channels])
     out = np.zeros(len(channels))
@@ -332,6 +333,8 @@ def calibrate(
     -------
     Estimate; the covariance is that of the least-squares problem at the end.
     """
+    from scipy.optimize import least_squares
+
     mean, prior = np.array([p.mean for p in task.chosen]), np.array([p.sigma for p in task.chosen])
     threads = workers or os.cpu_count() or 1
     low = np.array([1e-6 if p.group.kind == "multiplier" else -np.inf for p in task.chosen])

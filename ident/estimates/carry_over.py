@@ -141,14 +141,17 @@ def lattice(fins: list[Fin], counts: tuple[int, int, int] = _FINE) -> Lattice:
 
 def _segment(p: Array, a: Array, b: Array) -> Array:
     """Velocity at points p (n, 1, 3) of unit straight vortices from a to b (m, 3), Biot and Savart."""
-    r1, r2 = p - a, p - b
-    n1, n2 = np.linalg.norm(r1, axis=-1), np.linalg.norm(r2, axis=-1)
-    cross = np.cross(r1, r2)
-    square = np.sum(cross**2, axis=-1)
-    along = np.sum((b - a) * (r1 / n1[..., None] - r2 / n2[..., None]), axis=-1)
+    # By components: products of short vectors cost more than the numbers in them.
+    r1, r2 = ([p[..., i] - end[:, i] for i in range(3)] for end in (a, b))
+    n1, n2 = (np.sqrt(r[0] ** 2 + r[1] ** 2 + r[2] ** 2) for r in (r1, r2))
+    cross = [r1[i] * r2[j] - r1[j] * r2[i] for i, j in ((1, 2), (2, 0), (0, 1))]
+    square = cross[0] ** 2 + cross[1] ** 2 + cross[2] ** 2
+    side = [(b[:, i] - a[:, i]) * (r1[i] / n1 - r2[i] / n2) for i in range(3)]
     # On the vortex's own line the velocity is zero.
-    share = np.divide(along, 4.0 * np.pi * square, out=np.zeros_like(square), where=square > 1e-12)
-    return np.asarray(cross * share[..., None])
+    along = np.divide(
+        side[0] + side[1] + side[2], 4.0 * np.pi * square, out=np.zeros_like(square), where=square > 1e-12
+    )
+    return np.stack([one * along for one in cross], axis=-1)
 
 
 def horseshoes(p: Array, a: Array, b: Array) -> Array:

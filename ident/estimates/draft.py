@@ -67,11 +67,7 @@ class Draft:
 
     def where(self, terms: Sequence[str], parts: Sequence[str] = ("*",)) -> Mask:
         """(n,) True where coefficient and part match any of the shell patterns."""
-        chosen = [
-            any(fnmatchcase(name, t) for t in terms) and any(fnmatchcase(part, p) for p in parts)
-            for name, part in zip(self.rows["coefficient"], self.rows["part"], strict=True)
-        ]
-        return np.array(chosen, dtype=bool)
+        return _matching(self.rows["coefficient"], terms) & _matching(self.rows["part"], parts)
 
     def has(self, *terms: str) -> bool:
         """Whether any of the coefficients has a row."""
@@ -165,7 +161,7 @@ class Draft:
             self.directions[unknown] = self.directions.get(unknown, np.zeros(len(self.value))) + change
 
     def _say(self, chosen: Mask, word: str) -> None:
-        for i in np.flatnonzero(chosen):
+        for i in np.flatnonzero(chosen).tolist():
             self.words[i].append(word)
 
     # -- the version ---------------------------------------------------------------------------
@@ -187,6 +183,12 @@ class Draft:
         for direction in self.directions.values():
             total += np.outer(direction[at], direction[at])
         return with_covariance(out, list(first["estimate"]), total)
+
+
+def _matching(column: pd.Series, patterns: Sequence[str]) -> Mask:
+    """(n,) True where a name matches any of the shell patterns; each name is looked at once."""
+    number, names = pd.factorize(column)
+    return np.array([any(fnmatchcase(str(n), p) for p in patterns) for n in names], dtype=bool)[number]
 
 
 def with_covariance(rows: pd.DataFrame, numbers: Sequence[int], total: Array) -> pd.DataFrame:

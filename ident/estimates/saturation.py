@@ -9,6 +9,7 @@ own runs. Beyond it the load stays.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -61,10 +62,11 @@ def saturation(draft: Draft) -> str:
     if not continued.any():
         raise NotApplicable(f"no plane load beyond the runs (quality {_WORD})")
     mean, sigma = saturation_angle()
+    base_of = _at_straight(draft)
     change, lost = np.zeros(len(rows)), np.zeros(len(rows))
     for i in np.flatnonzero(continued):
         straight, full = abs(float(angle[i])), float(draft.value[i])
-        base = _at_straight(draft, int(i))
+        base = base_of(int(i))
         slope = (full - base) / (straight - _STRAIGHT)
         change[i] = slope * (reached(straight, mean, sigma) - straight)
         up, down = (reached(straight, mean + d, 0.5 * sigma) for d in (0.5 * sigma, -0.5 * sigma))
@@ -74,16 +76,17 @@ def saturation(draft: Draft) -> str:
     return f"lift saturates at {mean:.1f} +- {sigma:.1f} deg"
 
 
-def _at_straight(draft: Draft, i: int) -> float:
-    """Load of the same plane, speed and depth at the end of the straight part."""
+def _at_straight(draft: Draft) -> Callable[[int], float]:
+    """Of a row: the load of the same plane, speed and depth at the end of the straight part."""
     rows, angle = draft.rows, draft.axis("delta")
-    row = rows.iloc[i]
-    same = (
-        rows["coefficient"].eq(row["coefficient"])
-        & rows["part"].eq(row["part"])
-        & rows["speed_mps"].eq(row["speed_mps"])
-        & rows["depth_m"].eq(row["depth_m"])
-    ).to_numpy() & np.isclose(angle, np.sign(angle[i]) * _STRAIGHT)
-    if not same.any():
-        raise NotApplicable(f"{row['coefficient']}: no run at {_STRAIGHT:g} deg")
-    return float(draft.value[np.flatnonzero(same)[0]])
+    side = np.sign(angle)
+    columns = [rows[c].tolist() for c in ("coefficient", "part", "speed_mps", "depth_m")]
+    keys = list(zip(*columns, side.tolist(), strict=True))
+    ends = {keys[i]: i for i in reversed(np.flatnonzero(np.isclose(angle, side * _STRAIGHT)).tolist())}
+
+    def base(i: int) -> float:
+        if keys[i] not in ends:
+            raise NotApplicable(f"{keys[i][0]}: no run at {_STRAIGHT:g} deg")
+        return float(draft.value[ends[keys[i]]])
+
+    return base

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
 
 Array = NDArray[np.float64]
 Channels = dict[str, Array]
@@ -34,6 +33,8 @@ def at(x: Array, place: float | None) -> float | None:
 
 def circle_diameter(x: Array, y: Array) -> float:
     """Diameter of the circle with the least squared distances to the points."""
+    from scipy.optimize import least_squares
+
     linear = np.linalg.lstsq(np.column_stack([x, y, np.ones_like(x)]), x**2 + y**2, rcond=None)[0]
     start = [linear[0] / 2.0, linear[1] / 2.0]
     start.append(float(np.sqrt(linear[2] + start[0] ** 2 + start[1] ** 2)))

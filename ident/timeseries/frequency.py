@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import minimize_scalar
 
 Array = NDArray[np.float64]
 
@@ -80,6 +79,8 @@ def estimate(time: Array, values: Array, weight: Array, near: float | None) -> L
 
 
 def _channel(t: Array, y: Array, w: Array, span: float, near: float | None, c: int) -> Line | None:
+    from scipy.optimize import minimize_scalar
+
     centred = y - (w * y).sum() / w.sum()
     total = float((w * centred**2).sum())
     if total <= 1e-24 * float((w * y**2).sum()):

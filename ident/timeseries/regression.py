@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import solve_triangular
 
 Array = NDArray[np.float64]
 
@@ -35,6 +34,8 @@ def least_squares(x: Array, y: Array, weight: Array | None = None) -> tuple[Arra
     -----
     Held against the NIST StRD linear sets (``tests/test_nist_strd_linear.py``).
     """
+    from scipy.linalg import solve_triangular
+
     root = np.ones(len(x)) if weight is None else np.sqrt(weight)
     a, b = x * root[:, None], (y.T * root).T
     size = np.linalg.norm(a, axis=0)

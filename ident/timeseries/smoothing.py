@@ -16,9 +16,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import BSpline
-from scipy.linalg import LinAlgError, cho_solve_banded, cholesky_banded, solve_banded
-from scipy.optimize import minimize_scalar
 
 Array = NDArray[np.float64]
 _DEGREE = 4
@@ -73,16 +70,22 @@ class SmoothPath:
 
     def __call__(self, time: Array | float, derivative: int = 0) -> Array:
         """The most likely path, or its derivative, at some times [s]."""
+        from scipy.interpolate import BSpline
+
         return np.asarray(BSpline(self.knots, self.mean, _DEGREE)(time, derivative))
 
     def drawn(self, count: int, rng: np.random.Generator) -> list[SmoothPath]:
         """Paths drawn from the posterior."""
+        from scipy.linalg import solve_banded
+
         normal = rng.standard_normal((self.mean.size, count))
         away = solve_banded((0, len(self.factor) - 1), self.factor, normal)
         return [replace(self, mean=self.mean + one) for one in away.T]
 
     def again(self) -> SmoothPath:
         """This path smoothed once more as its samples were: the difference is the bias of smoothing."""
+        from scipy.linalg import cho_solve_banded
+
         right, centre = np.zeros(self.mean.size), self.centre
         for one in self.samples:
             value = _fitted(self.knots, self.mean - centre, one)
@@ -91,6 +94,9 @@ class SmoothPath:
 
     def deviation(self, time: Array | float, derivative: int = 0) -> Array:
         """Standard error of the path, or its derivative, at some times."""
+        from scipy.interpolate import BSpline
+        from scipy.linalg import cho_solve_banded
+
         at = np.atleast_1d(np.asarray(time, dtype=float))
         eye = np.eye(self.mean.size)
         basis = np.asarray(BSpline(self.knots, eye, _DEGREE)(at, derivative)) if at.size <= 64 else None
@@ -134,6 +140,8 @@ def knots_for(time: Array, lo: float | None = None, hi: float | None = None) -> 
 
 def _values(knots: Array, time: Array, derivative: int) -> tuple[Array, NDArray[np.int64]]:
     """Values of the five B-splines at each time, and the first of them."""
+    from scipy.interpolate import BSpline
+
     count = len(knots) - 2 * _DEGREE - 1
     place = (time - knots[_DEGREE]) / _step(knots)
     first = np.clip(np.floor(place).astype(np.int64), 0, count - 1)
@@ -145,6 +153,8 @@ def _values(knots: Array, time: Array, derivative: int) -> tuple[Array, NDArray[
 
 def _fitted(knots: Array, coefficients: Array, samples: Samples) -> Array:
     """The path, or its rate, at the times of some samples."""
+    from scipy.interpolate import BSpline
+
     return np.asarray(BSpline(knots, coefficients, _DEGREE)(samples.time, samples.derivative))
 
 
@@ -165,6 +175,8 @@ def _log_det(factor: Array) -> float:
 
 
 def _solve(bands: Array, right: Array) -> tuple[Array, Array]:
+    from scipy.linalg import cho_solve_banded, cholesky_banded
+
     factor = cholesky_banded(bands)
     return factor, cho_solve_banded((factor, False), right)
 
@@ -181,6 +193,8 @@ def noise_of(time: Array, value: Array) -> float:
 
 def _likely(time: Array, value: Array) -> tuple[float, float]:
     """Spectral density of the third derivative, and the noise, at the largest likelihood."""
+    from scipy.optimize import minimize_scalar
+
     knots = knots_for(time)
     scale = float(np.std(value)) or 1.0
     one = Samples(time, (value - value.mean()) / scale, 0, 1.0)
@@ -199,7 +213,7 @@ def _likely(time: Array, value: Array) -> tuple[float, float]:
         weight = unit * 10.0**decade
         try:
             factor, left = rest(weight)
-        except LinAlgError:
+        except np.linalg.LinAlgError:
             return math.inf
         return free * math.log(left / free) + _log_det(factor) - rank * math.log(weight)
 
@@ -241,13 +255,15 @@ def smooth(samples: list[Samples], lo: float | None = None, hi: float | None = N
 
 def _density(knots: Array, told: list[Samples], bands: Array, right: Array, near: float) -> float:
     """Spectral density of the third derivative at the largest likelihood, where the noise is known."""
+    from scipy.optimize import minimize_scalar
+
     penalty, rank = _penalty(knots), right.size - _ORDER
 
     def loss(decade: float) -> float:
         weight = 10.0**-decade / near
         try:
             factor, solved = _solve(bands + weight * penalty, right)
-        except LinAlgError:
+        except np.linalg.LinAlgError:
             return math.inf
         left = sum(float(np.sum((s.value - _fitted(knots, solved, s)) ** 2)) / s.sigma**2 for s in told)
         return left + weight * _roughness(knots, solved) + _log_det(factor) - rank * math.log(weight)

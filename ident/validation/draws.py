@@ -11,7 +11,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse.csgraph import connected_components
 
 from sim.files.errors import InputError
 
@@ -75,6 +74,8 @@ def factor(correlation: Array, least: float = 2.0 * _EQUAL) -> list[Block]:
     >>> factor(np.array([[1.0, 0.6], [0.6, 1.0]]))[0].root.tolist()
     [[1.0, 0.0], [0.6, 0.8]]
     """
+    from scipy.sparse.csgraph import connected_components
+
     if not np.isfinite(correlation).all():
         raise InputError("correlations", "values that are not finite", "numbers from -1 to 1")
     count, label = connected_components(correlation != 0.0, directed=False)

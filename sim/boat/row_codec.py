@@ -75,8 +75,10 @@ def correlation_texts(covariance: Array, names: Iterable[int] | None = None) -> 
     matrix = np.divide(covariance, scale, out=np.zeros_like(covariance), where=scale > 0.0)
     np.fill_diagonal(matrix, 0.0)
     found: dict[int, list[str]] = {}
-    for i, j in np.argwhere(np.abs(matrix) > _LEAST_CORRELATION):
-        found.setdefault(number[i], []).append(f"{number[j]}:{matrix[i, j]:.6g}")
+    row, column = np.nonzero(np.abs(matrix) > _LEAST_CORRELATION)
+    # Plain numbers: a version has some hundred thousand pairs.
+    for i, j, x in zip(row.tolist(), column.tolist(), matrix[row, column].tolist(), strict=True):
+        found.setdefault(number[i], []).append(f"{number[j]}:{x:.6g}")
     return {i: " ".join(items) for i, items in found.items()}
 
 
