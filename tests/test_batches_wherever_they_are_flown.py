@@ -115,7 +115,7 @@ def test_two_dask_processes_give_what_threads_give(cluster, case, campaign, rows
 @needs_dask
 @pytest.mark.parametrize("address", ["tcp://127.0.0.1:1", "nonsense", "tcp://no-such-host.invalid:8786"])
 def test_address_that_does_not_answer_is_named(address, case, campaign, rows, monkeypatch):
-    monkeypatch.setattr("ident.validation.cluster._PATIENCE", 1)
+    monkeypatch.setattr("ident.cluster._PATIENCE", 1)
     with pytest.raises(InputError) as refused:
         next(over_dask(address, batch_of(case, campaign.vehicle, rows), []))
     assert address in refused.value.where
@@ -124,7 +124,7 @@ def test_address_that_does_not_answer_is_named(address, case, campaign, rows, mo
 
 @needs_dask
 def test_workers_of_another_version_are_refused(cluster, case, campaign, rows, monkeypatch):
-    monkeypatch.setattr("ident.validation.cluster.__version__", "9.9.9")
+    monkeypatch.setattr("ident.cluster.__version__", "9.9.9")
     with pytest.raises(InputError, match=r"9\.9\.9"):
         next(over_dask(cluster.scheduler_address, batch_of(case, campaign.vehicle, rows), []))
 

@@ -40,12 +40,14 @@ from ident.captive.readers.opening import inputs
 from ident.captive.run_table import DIRECT, MEASURED, NUMBERS, run_table, sigma
 from ident.captive.runs import Found, source_runs
 from ident.captive.source import Source
+from ident.cluster import Spread, here
 from ident.output import Tell, html_table, silent
 from sim.boat.catalogue import OUTPUTS
 from sim.boat.parts import vehicle_terms
 from sim.boat.vehicle import Vehicle, load_vehicle
 from sim.files.errors import InputError
 from sim.files.frames import Frame
+from sim.files.inputs import note
 
 # Further files that one message names.
 _SHOWN = 20
@@ -131,7 +133,9 @@ def _check_words(folder: Path, runs: pd.DataFrame, allowed: dict[str, list[str]]
             raise InputError(place, repr(run[column]), ", ".join(words))
 
 
-def read_runs(folder: Path, header: CampaignFile, vehicle: Vehicle, tell: Tell = silent) -> tuple[pd.DataFrame, Found]:
+def read_runs(
+    folder: Path, header: CampaignFile, vehicle: Vehicle, tell: Tell = silent, spread: Spread = here
+) -> tuple[pd.DataFrame, Found]:
     """The checked runs of every source, in SI and radians but still in the campaign's frame.
 
     Parameters
@@ -139,6 +143,7 @@ def read_runs(folder: Path, header: CampaignFile, vehicle: Vehicle, tell: Tell =
     folder : The campaign's.
     header, vehicle : For the sources, the quality vocabulary and the names of the parts.
     tell : Told of every file.
+    spread : Reads them.
 
     Returns
     -------
@@ -153,7 +158,7 @@ def read_runs(folder: Path, header: CampaignFile, vehicle: Vehicle, tell: Tell =
     found = Found()
     words = {"test": list(tests().index), "part": vehicle.part_names(), "quality": list(header.quality)}
     for source in _sources(folder, header, vehicle):
-        for table in source_runs(folder, source, header, found, tell):
+        for table in source_runs(folder, source, header, found, tell, spread):
             _check_words(folder, table, {**words, "decoupled": ["", "True", "False"]})
             _check_complete(folder, table, vehicle)
     runs = pd.concat(found.tables, ignore_index=True) if found.tables else pd.DataFrame()
@@ -221,7 +226,9 @@ def _check_complete(folder: Path, runs: pd.DataFrame, vehicle: Vehicle) -> None:
                 raise InputError(f"{place}, column rel_sigma", "nothing", f"a number, or sigma_{bare[0]}_<unit>")
 
 
-def read_campaign(folder: str | os.PathLike[str], leave_out: bool = False, tell: Tell = silent) -> Campaign:
+def read_campaign(
+    folder: str | os.PathLike[str], leave_out: bool = False, tell: Tell = silent, spread: Spread = here
+) -> Campaign:
     """Read one captive campaign and turn it to the program frame.
 
     Parameters
@@ -230,6 +237,7 @@ def read_campaign(folder: str | os.PathLike[str], leave_out: bool = False, tell:
     leave_out : Leave histories whose time stamps do not rise to the quality checks, instead of
         refusing them all in one message.
     tell : Told of every file.
+    spread : Reads the files and reduces their histories, here or on a cluster (``ident.cluster``).
 
     Returns
     -------
@@ -254,11 +262,13 @@ def read_campaign(folder: str | os.PathLike[str], leave_out: bool = False, tell:
     vehicle = load_vehicle(header.vehicle, beside=folder / "campaign.toml")
     frame = header.frame.declared(f"{where}, [frame]")
     _check_named(header, vehicle, where)
-    runs, found = read_runs(folder, header, vehicle, tell)
+    runs, found = read_runs(folder, header, vehicle, tell, spread)
     if not leave_out:
         _refuse(found.refused)
     digests = {"campaign.toml": hashlib.sha256(raw).hexdigest()}
     for path in sorted({f for p in found.inputs for f in inputs(p)}):
+        # Another process may have read it.
+        note(path)
         digests[path.relative_to(folder).as_posix()] = _digest(path)
     histories = (tuple(found.reduced), tuple(found.refused))
     if runs.empty:

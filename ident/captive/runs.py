@@ -28,6 +28,7 @@ from ident.captive.source import NO_COLUMNS, Reduction, Source, idle_keys
 from ident.captive.stated import Stated, constants, outside_excluded
 from ident.captive.subtract import off_samples, off_table, taken_columns
 from ident.captive.uses import Uses, refuse_idle_quantities
+from ident.cluster import Spread, here
 from ident.output import Tell, silent
 from sim.boat.catalogue import OUTPUTS
 from sim.files.errors import InputError
@@ -52,7 +53,7 @@ class Found:
 
 
 def source_runs(
-    folder: Path, source: Source, header: CampaignFile, found: Found, tell: Tell = silent
+    folder: Path, source: Source, header: CampaignFile, found: Found, tell: Tell = silent, spread: Spread = here
 ) -> list[pd.DataFrame]:
     """Add all runs of one source to what was found.
 
@@ -63,6 +64,7 @@ def source_runs(
     header : The campaign, for frame, scale and density.
     found : Its lists grow.
     tell : Told of every file.
+    spread : Reads the files, here or on a cluster that sees the same folder.
 
     Returns
     -------
@@ -74,38 +76,53 @@ def source_runs(
         Naming file, row, column, what was found and what is allowed.
     """
     paths = matching(folder, source)
-    where = str(folder / "campaign.toml")
     tables: list[pd.DataFrame] = []
-    uses = Uses(source, where)
-    for done, path in enumerate(paths):
+    uses = Uses(source, str(folder / "campaign.toml"))
+    read = spread(_read, ((folder, path, source, header) for path in paths))
+    for done in range(len(paths)):
         tell(f"reading {source.files}", done, len(paths))
-        idle = idle_keys(source, reader_of(path, source))
-        if idle:
-            text = f"nothing: the reader {reader_of(path, source)} of {path.name} does not look at it"
-            raise InputError(f"{where}, key source.{idle[0]}", "declared", text)
-        stated = constants(folder, path, source)
-        name = path.relative_to(folder).as_posix()
-        try:
-            if source.rows == "history":
-                table, reduced = _from_histories(path, source, header, stated, where, uses)
-                found.reduced += [replace(one, file=name) for one in reduced]
-            else:
-                table = _from_table(path, source, header, stated, where, uses)
-        except NotRising as error:
-            # Every such file is to be named, not the first alone.
-            error.file = name
-            found.refused.append(error)
-            continue
-        turned = source.reduction is not None and source.reduction.kind == "oscillatory"
-        table = table.assign(file=name, files=source.files, axes="body" if turned else axes_of(source, header))
-        refuse_idle_quantities(table)
-        tables.append(outside_excluded(table, source, where))
+        table, reduced, refused, own = next(read)
+        uses.add(own)
+        found.reduced += reduced
+        if refused is not None:
+            found.refused.append(refused)
+        else:
+            tables.append(table)
     if paths and not found.refused:
         uses.refuse()
     tell(f"reading {source.files}", len(paths), len(paths))
     found.tables += tables
     found.inputs += paths
     return tables
+
+
+def _read(
+    folder: Path, path: Path, source: Source, header: CampaignFile
+) -> tuple[pd.DataFrame, list[Reduced], NotRising | None, Uses]:
+    """The runs of one file, its reduced histories, and what it made use of; or why its time stamps refuse it."""
+    where = str(folder / "campaign.toml")
+    uses = Uses(source, where)
+    idle = idle_keys(source, reader_of(path, source))
+    if idle:
+        text = f"nothing: the reader {reader_of(path, source)} of {path.name} does not look at it"
+        raise InputError(f"{where}, key source.{idle[0]}", "declared", text)
+    stated = constants(folder, path, source)
+    name = path.relative_to(folder).as_posix()
+    reduced: list[Reduced] = []
+    try:
+        if source.rows == "history":
+            table, reduced = _from_histories(path, source, header, stated, where, uses)
+            reduced = [replace(one, file=name) for one in reduced]
+        else:
+            table = _from_table(path, source, header, stated, where, uses)
+    except NotRising as error:
+        # Every such file is to be named, not the first alone.
+        error.file = name
+        return pd.DataFrame(), [], error, uses
+    turned = source.reduction is not None and source.reduction.kind == "oscillatory"
+    table = table.assign(file=name, files=source.files, axes="body" if turned else axes_of(source, header))
+    refuse_idle_quantities(table)
+    return outside_excluded(table, source, where), reduced, None, uses
 
 
 def _from_table(

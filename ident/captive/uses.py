@@ -42,6 +42,13 @@ class Uses:
         self._words: set[str] = set()
         self.beside: set[str] = set()
 
+    def add(self, other: Uses) -> None:
+        """What another file of the source made use of counts too."""
+        self.primed |= other.primed
+        self._ignored |= other._ignored
+        self._factors |= other._factors
+        self._words |= other._words
+
     def whole(self) -> None:
         """All factors are checked where the file is read."""
         self._factors |= set(self.source.factor)

@@ -24,6 +24,7 @@ from ident.text import on_screen
 @WAIT
 @click.option("--measured-only", is_flag=True, help="What the runs give, without any estimate.")
 @click.option("--without", multiple=True, metavar="ESTIMATE", help="Leave a named estimate out; may be repeated.")
+@click.option("--dask", default=None, metavar="ADDRESS", help="Read, reduce and solve on a Dask cluster.")
 def fit(
     folder: Path,
     db: str,
@@ -33,6 +34,7 @@ def fit(
     wait: float,
     measured_only: bool,
     without: tuple[str, ...],
+    dask: str | None,
 ) -> None:
     """Identify the coefficients of a campaign and commit one database version.
 
@@ -42,13 +44,14 @@ def fit(
 
     \b
     Example: ident fit raw_captive_data/ --db coeff_db
+             ident fit /shared/campaign --dask tcp://scheduler:8786
     """
     import ident
     from ident.fitting.fit import show
 
     console = console_for(quiet=json_path == "-")
     with told() as tell:
-        done = ident.fit(folder, db, message, force, wait, tell, measured_only, without)
+        done = ident.fit(folder, db, message, force, wait, tell, measured_only, without, dask)
     for one in done:
         show(one, console)
     if json_path:

@@ -15,6 +15,7 @@ from ident.captive.campaign import Campaign, find_campaigns, read_campaign
 from ident.captive.combine import by_vehicle
 from ident.checks.check import check_campaign, refuse_errors
 from ident.checks.findings import Finding
+from ident.cluster import cluster
 from ident.database.lock import WAIT
 from ident.database.provenance import conversions, run_sources
 from ident.database.store import commit, database_rows, digest
@@ -169,6 +170,7 @@ def fit(
     tell: Tell = silent,
     measured_only: bool = False,
     without: Collection[str] = (),
+    dask: str | None = None,
 ) -> Results[Fit]:
     """Identify the coefficients of every campaign at or below a folder; commit one version each.
 
@@ -190,6 +192,8 @@ def fit(
     tell : Told what is done, how much of it, and of how much.
     measured_only : Leave all estimates out.
     without : Names of estimates to leave out.
+    dask : Address of a Dask scheduler whose workers, which see the same folders, read the files, reduce their
+        histories and solve the blocks of unknowns; the result is that of this machine alone.
 
     Returns
     -------
@@ -222,8 +226,9 @@ def fit(
     """
     path_of_db = os.fspath(db)
     paths = find_campaigns(Path(folder))
-    read, paths = by_vehicle([read_campaign(path, tell=tell) for path in paths], paths)
-    identified = [identify(campaign, tell) for campaign in read]
+    with cluster(dask) as spread:
+        read, paths = by_vehicle([read_campaign(path, tell=tell, spread=spread) for path in paths], paths)
+        identified = [identify(campaign, tell, spread) for campaign in read]
     checked = [check_campaign(*one, tell) for one in zip(read, paths, identified, strict=True)]
     if not force.strip():
         for path, findings in zip(paths, checked, strict=True):

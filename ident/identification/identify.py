@@ -21,6 +21,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from ident.captive.campaign import Campaign, tests
+from ident.cluster import Spread, here
 from ident.identification.equations import Runs
 from ident.identification.facilities import Between, Left, between, together, widened
 from ident.identification.nodes import Node, by_coefficient, table_points
@@ -85,7 +86,7 @@ def _propulsion_point(solver: Solver, runs: pd.DataFrame) -> None:
     solver.tables.clear()
 
 
-def identify(campaign: Campaign, tell: Tell = silent) -> Identification:
+def identify(campaign: Campaign, tell: Tell = silent, spread: Spread = here) -> Identification:
     """Every coefficient the campaign supports, with covariance.
 
     Several campaigns of one boat that were put together are fitted twice: the second time with the
@@ -95,22 +96,23 @@ def identify(campaign: Campaign, tell: Tell = silent) -> Identification:
     ----------
     campaign : From ``read_campaign``.
     tell : Told of the runs of every stage.
+    spread : Solves the blocks of unknowns that have nothing to do with one another, here or on a cluster.
 
     Returns
     -------
     Identification; runs that could not be used are listed with the reason.
     """
     if not campaign.members:
-        return _identify(campaign, tell)[0]
-    found, left = _identify(campaign, tell)
+        return _identify(campaign, tell, spread)[0]
+    found, left = _identify(campaign, tell, spread)
     apart = between(left, campaign.runs["campaign"].tolist())
     if any(one.tau > 0.0 for one in apart):
-        found, _ = _identify(replace(campaign, runs=widened(campaign.runs, left, apart)), tell)
+        found, _ = _identify(replace(campaign, runs=widened(campaign.runs, left, apart)), tell, spread)
         found = replace(found, campaign=campaign)
     return replace(found, between=tuple(apart))
 
 
-def _identify(campaign: Campaign, tell: Tell) -> tuple[Identification, Left]:
+def _identify(campaign: Campaign, tell: Tell, spread: Spread) -> tuple[Identification, Left]:
     """One pass through all stages, and what it leaves of the loads of several campaigns."""
     solver = Solver(campaign)
     check_levers(solver)
@@ -122,7 +124,7 @@ def _identify(campaign: Campaign, tell: Tell) -> tuple[Identification, Left]:
         rows, first = np.flatnonzero(at == stage), len(solver.nodes)
         tell("identifying", done, len(at))
         done += len(rows)
-        solver.solve(runs, solver.equations(runs, rows), first)
+        solver.solve(runs, solver.equations(runs, rows), first, spread)
         solver.tables.clear()
         _propulsion_point(solver, campaign.runs.iloc[rows])
     tell("identifying", len(at), len(at))

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from ident.captive.campaign import Campaign
 from ident.captive.published import TEST as PUBLISHED
 from ident.captive.run_table import MEASURED
+from ident.cluster import Spread, here
 from ident.identification.equations import ALWAYS, BEYOND, NONZERO, Equations, Form, Note, Runs
 from ident.identification.facilities import Left
 from ident.identification.nodes import Node, by_coefficient, key_point, table_points
@@ -260,14 +261,15 @@ class Solver:
 
     # -- solution ------------------------------------------------------------------------
 
-    def solve(self, runs: Runs, equations: Equations, first: int) -> None:
+    def solve(self, runs: Runs, equations: Equations, first: int, spread: Spread = here) -> None:
         """Weighted least squares for the nodes from ``first`` on; carries the covariance."""
         if len(self.nodes) == first:
             return
         a, b = equations.design(first)
         sign = np.sign(equations.value)
         shared = runs.origins()[equations.run] * len(MEASURED) + equations.output
-        found = solve_stage(a, b, equations.value, equations.sigma, sign, shared, self.values, self.covariance)
+        loads = (equations.value, equations.sigma, sign, shared)
+        found = solve_stage(a, b, *loads, self.values, self.covariance, spread=spread)
         for node in found.lost:
             bad = self.nodes[first + node]
             text = f"{bad.part} at {bad.point}: the runs cannot tell it from other terms; dropped"

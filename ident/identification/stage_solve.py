@@ -16,6 +16,8 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import connected_components
 
+from ident.cluster import Spread, here
+
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 # A matrix, full or sparse.
@@ -25,6 +27,8 @@ Matrix = Any
 _RANK = 1e-9
 # Equations up to which matrices are full: for few, sparse ones are slower.
 _FULL = 2000
+# Numbers of the blocks that are solved at once.
+_SHARE = 200_000
 # An equation with this leverage or more has nothing to be compared with.
 _FREE = 1.0 - 1e-9
 
@@ -48,13 +52,14 @@ def weights(a: Matrix, sigma: Array) -> Array:
     return 1.0 / (np.where(relative > 0.0, relative, least) * scale)
 
 
-def gain_matrix(a: Matrix, weight: Array) -> tuple[Matrix, list[int]]:
+def gain_matrix(a: Matrix, weight: Array, spread: Spread = here) -> tuple[Matrix, list[int]]:
     """Weighted least-squares operator, solved block by block.
 
     Parameters
     ----------
     a : (equations, unknowns) design, full or sparse.
     weight : (equations,) from ``weights``.
+    spread : Solves the blocks, some at a time.
 
     Returns
     -------
@@ -65,20 +70,53 @@ def gain_matrix(a: Matrix, weight: Array) -> tuple[Matrix, list[int]]:
     design.eliminate_zeros()
     lost: list[int] = []
     found: list[tuple[Indices, Indices, Array]] = []
-    for r, c, local in _blocks(design):
-        local *= weight[r, None]
-        size = np.linalg.norm(local, axis=0)
-        if not (np.isfinite(local).all() and np.all(size > 0.0)):
-            lost += [int(k) for k in c]
-            continue
-        u, s, vt = np.linalg.svd(local / size, full_matrices=False)
-        good = s > _RANK * s[0]
-        if good.sum() < c.size:
-            null = _null_space(local / size, int(good.sum()))
-            lost += [int(c[k]) for k in range(c.size) if np.abs(null[:, k]).max() > 1e-6]
-        inverse = (vt[good].T / s[good]) @ u[:, good].T
-        found.append((c, r, inverse / size[:, None] * weight[r][None, :]))
+    places: list[list[tuple[Indices, Indices]]] = []
+
+    def shares() -> Iterator[tuple[list[tuple[Array, Array]]]]:
+        for some in _together(_blocks(design)):
+            places.append([(r, c) for r, c, _ in some])
+            yield ([(local, weight[r]) for r, _, local in some],)
+
+    for number, solved in enumerate(spread(_operators, shares())):
+        for (r, c), (operator, undetermined) in zip(places[number], solved, strict=True):
+            lost += [int(c[k]) for k in undetermined]
+            if operator is not None:
+                found.append((c, r, operator))
     return _assembled(found, (design.shape[1], design.shape[0]), isinstance(a, np.ndarray)), lost
+
+
+def _together(blocks: Iterator[tuple[Indices, Indices, Array]]) -> Iterator[list[tuple[Indices, Indices, Array]]]:
+    """Blocks in lists of some size: one by one they are too small to be sent anywhere."""
+    some: list[tuple[Indices, Indices, Array]] = []
+    size = 0
+    for block in blocks:
+        some.append(block)
+        size += block[2].size
+        if size >= _SHARE:
+            yield some
+            some, size = [], 0
+    if some:
+        yield some
+
+
+def _operators(blocks: list[tuple[Array, Array]]) -> list[tuple[Array | None, list[int]]]:
+    """Operator and undetermined columns of each block, a full design with the weights of its equations."""
+    return [_operator(local, weight) for local, weight in blocks]
+
+
+def _operator(design: Array, weight: Array) -> tuple[Array | None, list[int]]:
+    local = design * weight[:, None]
+    size = np.linalg.norm(local, axis=0)
+    if not (np.isfinite(local).all() and np.all(size > 0.0)):
+        return None, list(range(local.shape[1]))
+    u, s, vt = np.linalg.svd(local / size, full_matrices=False)
+    good = s > _RANK * s[0]
+    lost: list[int] = []
+    if good.sum() < local.shape[1]:
+        null = _null_space(local / size, int(good.sum()))
+        lost = [k for k in range(local.shape[1]) if np.abs(null[:, k]).max() > 1e-6]
+    inverse = (vt[good].T / s[good]) @ u[:, good].T
+    return inverse / size[:, None] * weight[None, :], lost
 
 
 def _blocks(design: csr_array) -> Iterator[tuple[Indices, Indices, Array]]:
@@ -164,6 +202,7 @@ def solve_stage(
     values: Array,
     covariance: Array,
     full: int = _FULL,
+    spread: Spread = here,
 ) -> Stage:
     """Weighted least squares for the unknowns of a stage, with their covariance.
 
@@ -180,6 +219,7 @@ def solve_stage(
     shared : (equations,) number of the error that each load has.
     values, covariance : (old,) and (old, old) found before.
     full : Equations up to which matrices are full.
+    spread : Solves the blocks of unknowns.
 
     Returns
     -------
@@ -187,7 +227,7 @@ def solve_stage(
     """
     errors = _errors(sigma, sign, shared)
     design, known = (a.toarray(), b.toarray()) if len(sigma) <= full else (a, b)
-    gain, lost = gain_matrix(design, weights(design, sigma))
+    gain, lost = gain_matrix(design, weights(design, sigma), spread)
     rest = measured - known @ values
     new = gain @ rest
     noise = gain @ errors

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import math
 import os
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor, as_completed
+import shutil
+import tempfile
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
-from scipy.special import chdtri
 
 from ident.metrics.measure import Metrics, measured
 from ident.text import on_screen
@@ -37,6 +40,12 @@ Array = NDArray[np.float64]
 CHUNK = 8
 # Of a machine that does not say how much memory it has [bytes].
 _LEAST_MEMORY = 4e9
+# Share of it that the records of all channels may take before they go to a file; and how many arrays of the size
+# of the draws, or of the records of a channel, are held at once at most.
+_IN_MEMORY = 0.25
+_HELD = 8
+# Samples up to which their products are one matrix: beyond, it would be larger than all they are made of.
+_SQUARE = 2000
 # Probability that chance alone lists a coefficient as a cause of a channel's width.
 _BY_CHANCE = 0.01
 LEVELS = {"50": (25.0, 75.0), "95": (2.5, 97.5)}
@@ -182,17 +191,45 @@ def batch_of(case: Case, vehicle: Vehicle, rows: pd.DataFrame) -> Batch:
 
 
 def _check_room(case: Case, vehicle: Vehicle, rows: pd.DataFrame, samples: int) -> None:
-    """Refuse more samples than the memory of this machine holds, before any is drawn. Raises ``InputError``."""
+    """Refuse more samples than memory and disk hold, before any is drawn. Raises ``InputError``.
+
+    In memory stand draws and scores of all samples and the records of one channel at a time; the records of all
+    channels go to a file where they are large.
+    """
     sources = case.reference.compare if case.reference else []
     flights = 1 + sum(case.started_as(s) is not None for s in sources)
     steps, every = samples_of(case)
     channels = len(columns_of(vehicle, uses_tanks(case))) + len(DERIVED)
-    # A record is copied once where samples failed; a draw is kept beside the values it gives.
-    each = 8 * (2 * flights * channels * (steps // every + 1) + 3 * len(rows))
-    room = _memory()
+    record = 8 * (steps // every + 1)
+    values = 8 * len(rows["estimate"].unique())
+    _refuse_beyond(samples, _HELD * (values + record), _memory(), "memory")
+    if samples * flights * channels * record > _IN_MEMORY * _memory():
+        room = shutil.disk_usage(tempfile.gettempdir()).free
+        _refuse_beyond(samples, flights * channels * record, room, f"room in {tempfile.gettempdir()}")
+
+
+def _refuse_beyond(samples: int, each: float, room: float, what: str) -> None:
     if samples * each > room:
         text = f"{samples} samples of {each / 1e6:.3g} MB each"
-        raise InputError("--samples", text, f"{max(int(room / each), 0)} at most in {room / 1e9:.3g} GB of memory")
+        raise InputError("--samples", text, f"{max(int(room / each), 0)} at most in {room / 1e9:.3g} GB of {what}")
+
+
+def _records(shape: tuple[int, int, int]) -> Array:
+    """(channels, samples, records) without numbers yet; in a nameless file where memory is better kept."""
+    if 8 * math.prod(shape) <= _IN_MEMORY * _memory():
+        return np.full(shape, np.nan)
+    with tempfile.TemporaryFile() as file:
+        found: Array = np.memmap(file, dtype=np.float64, mode="w+", shape=shape)
+    return found
+
+
+def _without_failed(stack: Array, flown: NDArray[np.bool_]) -> Array:
+    """(channels, flown samples, records), channel by channel in place."""
+    count = int(flown.sum())
+    if count < flown.size:
+        for channel in stack:
+            channel[:count] = channel[flown]
+    return stack[:, :count]
 
 
 def _memory() -> float:
@@ -204,15 +241,22 @@ def _memory() -> float:
 
 
 def _over_threads(
-    batch: Batch, chunks: Sequence[Array], workers: int | None
+    batch: Batch, chunks: Iterable[Array], workers: int | None
 ) -> Iterator[tuple[int, list[Flown | None]]]:
-    """Place of a chunk and its flights, as they are done."""
-    with ThreadPoolExecutor(workers or os.cpu_count()) as pool:
-        place = {pool.submit(batch.fly, chunk): i for i, chunk in enumerate(chunks)}
+    """Place of a chunk and its flights, in order; few chunks are made before they are flown."""
+    threads = workers or os.cpu_count() or 1
+    waiting: deque[Future[list[Flown | None]]] = deque()
+    with ThreadPoolExecutor(threads) as pool:
         try:
-            for future in as_completed(list(place)):
-                # Popped, so that its flights are not kept.
-                yield place.pop(future), future.result()
+            done = 0
+            for chunk in chunks:
+                waiting.append(pool.submit(batch.fly, chunk))
+                if len(waiting) > 2 * threads:
+                    yield done, waiting.popleft().result()
+                    done += 1
+            while waiting:
+                yield done, waiting.popleft().result()
+                done += 1
         except BaseException:
             # Who stops here does not wait for what has not begun.
             pool.shutdown(wait=False, cancel_futures=True)
@@ -250,19 +294,19 @@ def fly_samples(
     Raises
     ------
     InputError
-        When no sample has a self-propulsion state, for more samples than the memory holds, or as
+        When no sample has a self-propulsion state, for more samples than memory and disk hold, or as
         ``ident.validation.cluster.over_dask``.
     """
     _check_room(case, vehicle, rows, samples)
     estimates, correlation = correlation_matrix(rows)
     draws = draw(correlation, samples, seed)
     index, step = _row_steps(rows, estimates)
-    value = rows["value"].to_numpy() + np.where(index >= 0, draws[:, index] * step, 0.0)
-    chunks = [value[i : i + chunk] for i in range(0, samples, chunk)]
+    value = rows["value"].to_numpy()
+    chunks = (value + np.where(index >= 0, draws[i : i + chunk, index] * step, 0.0) for i in range(0, samples, chunk))
     batch = batch_of(case, vehicle, rows)
     steps, every = samples_of(case)
     shape = (len(batch.channels), samples, steps // every + 1)
-    stacks = {source: np.full(shape, np.nan) for source in batch.flights}
+    stacks = {source: _records(shape) for source in batch.flights}
     flown = np.zeros(samples, dtype=bool)
     metrics: dict[int, Metrics] = {}
     for place, found in over_dask(dask, batch, chunks) if dask else _over_threads(batch, chunks, workers):
@@ -273,16 +317,17 @@ def fly_samples(
             metrics[i] = one.metrics
             for source, record in one.records.items():
                 stacks[source][:, i, : record.shape[1]] = record
+                stacks[source][:, i, record.shape[1] :] = np.nan
         each(len(found))
     if not flown.any():
         raise InputError(f"case {case.name}", "no sample has a self-propulsion state", "smaller errors or another case")
-    kept = {source: stack if flown.all() else stack[:, flown] for source, stack in stacks.items()}
+    kept = {source: _without_failed(stack, flown) for source, stack in stacks.items()}
     time, channels = _up_to_the_end(case, batch, kept)
     return Bands(
         time=time,
         channels=channels.pop(""),
         own=channels,
-        draws=draws[flown],
+        draws=draws if flown.all() else draws[flown],
         correlation=correlation,
         estimates=list(estimates["coefficient"]),
         failed=int(samples - flown.sum()),
@@ -372,18 +417,25 @@ def variance_shares(bands: Bands, channel: str, most: int = 8) -> list[dict[str,
     ``coefficient``, ``share`` (0 to 1) and ``standard_error``, surest share (share less twice its
     standard error) first.
     """
+    from scipy.special import chdtri
+
     values = bands.channels[channel]
     complete = np.isfinite(values).all(axis=0)
     spread = values[:, complete] - values[:, complete].mean(axis=0)
     if len(values) < 3 or not spread.any():
         return []
     every = bands.scores()
-    products = product(spread, spread.T)
-    along = product(products, np.concatenate(list(every.values()), axis=1))
+    columns = np.concatenate(list(every.values()), axis=1)
+    if len(spread) <= _SQUARE:
+        products = product(spread, spread.T)
+        along, size = product(products, columns), np.diag(products)
+    else:
+        along, size = product(spread, product(spread.T, columns)), np.einsum("ij,ij->i", spread, spread)
+    del columns
     found, first = [], 0
     for coefficient, own in every.items():
         samples, rank = own.shape
-        share, without = _without_each(own, along[:, first : first + rank], np.diag(products))
+        share, without = _without_each(own, along[:, first : first + rank], size)
         first += rank
         if samples * share <= chdtri(rank, _BY_CHANCE / len(every)):
             continue
