@@ -15,7 +15,8 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from ident.analysis.stability import Linear, Stability, StabilityMap, stability
-    from ident.calibration.version import Calibrated, calibrate
+    from ident.calibration.result import Calibrated
+    from ident.calibration.version import calibrate
     from ident.captive.campaign import Campaign, read_campaign
     from ident.checks.checked import Checked, check
     from ident.checks.findings import Finding
@@ -58,7 +59,7 @@ _PLACES = {
     "Plan": "ident.planning.matrix",
     "Need": "ident.planning.matrix",
     "Fit": "ident.fitting.fit",
-    "Calibrated": "ident.calibration.version",
+    "Calibrated": "ident.calibration.result",
     "Validation": "ident.validation.result",
     "ChannelError": "ident.validation.result",
     "Simulation": "sim.flight.simulate",

@@ -5,8 +5,7 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Callable
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -15,81 +14,25 @@ from numpy.typing import NDArray
 from ident.calibration.estimate import Channel, Estimate, Problem, contradictions, problem
 from ident.calibration.estimate import calibrate as most_probable
 from ident.calibration.file import Parameter, apply, load_calibration, parameters
+from ident.calibration.result import Calibrated, Group, Known, LeftOut, Prior, Summary, TrainedSeries
 from ident.database.lock import WAIT
 from ident.database.store import commit, digest
 from ident.estimates.draft import measured_rows
-from ident.output import html_table
-from ident.text import on_screen
 from sim.boat.database import NUMBERS, Version, column_order, own_version, read_rows, versions
 from sim.boat.row_codec import correlation_matrix, correlation_texts
 from sim.boat.vehicle import load_vehicle
 from sim.files.errors import InputError
 
-if TYPE_CHECKING:
-    from rich.console import Console
-
 Array = NDArray[np.float64]
 
+# Metadata of the fit that go on with its rows.
+_FIT = ("conversions", "options", "unused", "warnings", "quality", "checks", "runs")
 # Two multipliers whose posterior correlation is beyond this cannot be told apart.
 _ALIKE = 0.9
 # A multiplier whose posterior is this close to its prior was not learnt.
 _UNLEARNT = 0.9
 # A multiplier that moves by more of its standard deviations without one source is said.
 _SHIFTED = 2.0
-
-
-@dataclass(frozen=True)
-class Calibrated:
-    """One calibration, committed.
-
-    Attributes
-    ----------
-    summary : Priors, posteriors, series, what was left out and warnings, as the version's
-        metadata holds them.
-    version : Number of the version that holds the calibrated rows.
-    new : False when the latest version held them already.
-    digest : SHA-256 of the content of the rows.
-
-    Examples
-    --------
-    >>> import ident
-    >>> _ = ident.fit("my-boat/captive", db="trained_db")
-    >>> done = ident.calibrate("my-boat/calibration.toml", db="trained_db", left_out=False)
-    >>> done.groups.loc["rudders", "verdict"]
-    'within the captive error'
-    """
-
-    summary: dict[str, Any]
-    version: int
-    new: bool
-    digest: str
-
-    @property
-    def groups(self) -> pd.DataFrame:
-        """One row a group: prior, its sigma, captive error, posterior, its sigma, and the verdict."""
-        rows = [
-            {
-                "group": g["name"],
-                "prior": g["prior"]["mean"],
-                "prior_sigma": g["prior"]["sigma"],
-                "captive_sigma": g["captive_sigma"],
-                "posterior": g["posterior"]["value"],
-                "posterior_sigma": g["posterior"]["sigma"],
-                "verdict": verdict(g),
-            }
-            for g in self.summary["groups"]
-        ]
-        return pd.DataFrame(rows).set_index("group")
-
-    def to_dict(self) -> dict[str, Any]:
-        """The calibration for a program to read."""
-        return {**self.summary, "version": self.version, "new": self.new, "digest": self.digest}
-
-    def _repr_html_(self) -> str:
-        title = f"{self.summary['calibration']}: version {self.version}, digest {self.digest[:16]}"
-        table = self.groups
-        rows = [(name, *(f"{x:.3g}" for x in row[:5]), row[5]) for name, *row in table.itertuples()]
-        return html_table(title, ("group", *table.columns), rows)
 
 
 def captive_version(db: str, vehicle: str, number: int | None) -> Version:
@@ -128,31 +71,27 @@ def from_data(parameter: Parameter, value: float, sigma: float) -> tuple[float, 
     return float(alone), float(gained**-0.5)
 
 
-def _group(parameter: Parameter, value: float, sigma: float) -> dict[str, Any]:
+def _group(parameter: Parameter, value: float, sigma: float) -> Group:
     prior = parameter.group.prior
     alone = from_data(parameter, value, sigma)
     away = None
     if alone is not None:
         away = abs(alone[0] - parameter.mean) / float(np.hypot(alone[1], parameter.sigma))
-    return {
-        "name": parameter.group.name,
-        "title": parameter.group.title,
-        "kind": parameter.group.kind,
-        "terms": parameter.group.terms,
-        "values": int(parameter.rows.sum()),
-        "prior": {
-            "mean": parameter.mean,
-            "sigma": parameter.sigma,
-            "method": parameter.method,
-            "estimate": prior.method not in ("captive", "stated"),
-            "source": prior.source,
-        },
-        "captive_sigma": parameter.captive,
-        "posterior": {"value": value, "sigma": sigma},
-        "maneuvers_alone": None if alone is None else {"value": alone[0], "sigma": alone[1]},
-        "away_from_prior": away,
-        "beyond_captive": parameter.beyond_captive(value),
-    }
+    method = parameter.method
+    known = Prior(parameter.mean, parameter.sigma, method, prior.method not in ("captive", "stated"), prior.source)
+    return Group(
+        name=parameter.group.name,
+        title=parameter.group.title,
+        kind=parameter.group.kind,
+        terms=parameter.group.terms,
+        values=int(parameter.rows.sum()),
+        prior=known,
+        captive_sigma=parameter.captive,
+        posterior=Known(value, sigma),
+        maneuvers_alone=None if alone is None else Known(*alone),
+        away_from_prior=away,
+        beyond_captive=parameter.beyond_captive(value),
+    )
 
 
 def _identifiability(task: Problem, estimate: Estimate) -> list[str]:
@@ -172,7 +111,7 @@ def _identifiability(task: Problem, estimate: Estimate) -> list[str]:
     return said
 
 
-def _left_out(task: Problem, whole: Estimate, workers: int | None, each: Callable[[str], None]) -> list[dict[str, Any]]:
+def _left_out(task: Problem, whole: Estimate, workers: int | None, each: Callable[[str], None]) -> list[LeftOut]:
     """The calibration repeated without each source of each case, and what it then predicts."""
     found = []
     for out in dict.fromkeys(c.key[:2] for c in task.channels):
@@ -190,27 +129,19 @@ def _left_out(task: Problem, whole: Estimate, workers: int | None, each: Callabl
             c.key[2]: float(np.sqrt(np.mean(r**2))) for c, r in zip(task.channels, residuals, strict=True) if dropped(c)
         }
         shift = (estimate.theta - whole.theta) / np.maximum(estimate.deviation, whole.deviation)
-        found.append(
-            {
-                "case": out[0],
-                "source": out[1],
-                "value": [float(x) for x in estimate.theta],
-                "sigma": [float(x) for x in estimate.deviation],
-                "shift_in_sigma": [float(x) for x in shift],
-                "rmse_predicted": predicted,
-                "rmse_trained": {k[2]: v for k, v in whole.rms.items() if k[:2] == out},
-            }
-        )
+        trained = {k[2]: v for k, v in whole.rms.items() if k[:2] == out}
+        values, sigmas, shifts = ([float(x) for x in own] for own in (estimate.theta, estimate.deviation, shift))
+        found.append(LeftOut(*out, values, sigmas, shifts, predicted, trained))
     return found
 
 
-def _shifts(task: Problem, left_out: list[dict[str, Any]]) -> list[str]:
+def _shifts(task: Problem, left_out: list[LeftOut]) -> list[str]:
     said = []
     for one in left_out:
-        for parameter, shift in zip(task.chosen, one["shift_in_sigma"], strict=True):
+        for parameter, shift in zip(task.chosen, one.shift_in_sigma, strict=True):
             if abs(shift) > _SHIFTED:
                 text = f"{parameter.group.name} moves by {abs(shift):.1f} standard deviations without"
-                said.append(f"contradictory data: {text} {one['case']} {one['source']}")
+                said.append(f"contradictory data: {text} {one.case} {one.source}")
     return said
 
 
@@ -308,99 +239,43 @@ def calibrate(
         rows = measured_rows(rows)
     chosen = parameters(spec, vehicle, rows, where)
     task = problem(spec, where, vehicle, rows, chosen)
-    estimate = most_probable(task, workers, each)
-    estimate = _rounded(estimate)
-    theta, sigma = [float(x) for x in estimate.theta], [float(x) for x in estimate.deviation]
+    estimate = _rounded(most_probable(task, workers, each))
     without = _left_out(task, estimate, workers, each) if left_out else []
-    warnings = contradictions(task) + _shifts(task, without) + _identifiability(task, estimate)
-    if not estimate.converged:
-        warnings.insert(0, f"not converged after {estimate.rounds} rounds")
-    summary = {
-        "calibration": spec.name,
-        "vehicle": vehicle.name,
-        "parent": base.number,
-        "parent_digest": base.digest,
-        "source": spec.source,
-        "file_digest": own,
-        "trained": list(dict.fromkeys(f"{c.key[0]}:{c.key[1]}" for c in task.channels)),
-        "groups": [_group(p, x, s) for p, x, s in zip(chosen, theta, sigma, strict=True)],
-        "covariance": estimate.covariance.tolist(),
-        "series": [
-            {
-                "case": k[0],
-                "source": k[1],
-                "channel": k[2],
-                "rmse": float(f"{v:.4g}"),
-                "sigma": float(f"{estimate.sigma[k]:.4g}"),
-            }
-            for k, v in estimate.rms.items()
+    sigma = estimate.deviation
+    summary = Summary(
+        calibration=spec.name,
+        vehicle=vehicle.name,
+        parent=base.number,
+        parent_digest=base.digest,
+        source=spec.source,
+        file_digest=own,
+        trained=list(dict.fromkeys(f"{c.key[0]}:{c.key[1]}" for c in task.channels)),
+        groups=[_group(p, float(x), float(s)) for p, x, s in zip(chosen, estimate.theta, sigma, strict=True)],
+        covariance=estimate.covariance.tolist(),
+        series=[
+            TrainedSeries(*key, float(f"{rmse:.4g}"), float(f"{estimate.sigma[key]:.4g}"))
+            for key, rmse in estimate.rms.items()
         ],
-        "left_out": without,
-        "warnings": warnings,
-    }
+        left_out=without,
+        warnings=_warnings(task, estimate, without),
+    )
     done = calibrated_rows(rows, chosen, estimate)
-    kept = {
-        k: v for k, v in base.metadata.items() if k in ("campaign", "facility", "provenance", "frame", "inputs", *_FIT)
-    }
-    trained = list(dict.fromkeys(c.key[0] for c in task.channels))
-    metadata = {
-        **kept,
-        "parent": str(base.number),
-        "trained": json.dumps(trained),
-        "calibration": json.dumps(summary),
-        "message": message,
-    }
-    number, new = commit(db, done, metadata, wait)
+    number, new = commit(db, done, _metadata(base, task, summary, message), wait)
     return Calibrated(summary, number, new, digest(done))
 
 
-_FIT = ("conversions", "options", "unused", "warnings", "quality", "checks", "runs")
+def _warnings(task: Problem, estimate: Estimate, without: list[LeftOut]) -> list[str]:
+    """What to beware of, that it did not converge first."""
+    halted = [] if estimate.converged else [f"not converged after {estimate.rounds} rounds"]
+    return halted + contradictions(task) + _shifts(task, without) + _identifiability(task, estimate)
 
 
-def show(done: Calibrated, console: Console) -> None:
-    """Print priors and posteriors, the series, what was left out, and what to beware of."""
-    from rich.markup import escape
-    from rich.table import Table
-
-    summary = done.summary
-    table = Table("group", "prior", "captive error", "posterior", "maneuvers alone", "verdict")
-    table.title = on_screen(f"{summary['calibration']}: multipliers on version {summary['parent']}")
-    for g in summary["groups"]:
-        alone, prior, after = g["maneuvers_alone"], g["prior"], g["posterior"]
-        colour = "red" if g["beyond_captive"] else "green"
-        table.add_row(
-            on_screen(g["name"]),
-            f"{prior['mean']:.2f} ± {prior['sigma']:.2f}",
-            f"± {g['captive_sigma']:.2f}",
-            f"[{colour}]{after['value']:.3f} ± {after['sigma']:.3f}[/]",
-            "-" if alone is None else f"{alone['value']:.2f} ± {alone['sigma']:.2f}",
-            verdict(g),
-        )
-    console.print(table)
-    table = Table("case", "source", "channel", "RMSE", "sigma", title="Training series, units of the references")
-    for s in summary["series"]:
-        table.add_row(
-            *(on_screen(s[k]) for k in ("case", "source", "channel")), f"{s['rmse']:.4g}", f"{s['sigma']:.4g}"
-        )
-    console.print(table)
-    for one in summary["left_out"]:
-        errors = ", ".join(
-            f"{k} {v:.3g} ({one['rmse_trained'][k]:.3g} trained)" for k, v in one["rmse_predicted"].items()
-        )
-        text = f"left out {one['case']} {one['source']}, predicted RMSE: {errors}"
-        console.print(on_screen(text), highlight=False)
-    for text in summary["warnings"]:
-        console.print(f"[yellow]warning[/] {escape(text)}", highlight=False)
-    state = "committed" if done.new else "unchanged, nothing committed: already"
-    console.print(f"[bold]{state} version {done.version}[/]  digest {done.digest[:16]}", highlight=False)
-
-
-def verdict(group: dict[str, Any]) -> str:
-    """What a posterior says: of an estimate, whether it agrees; of the captive error, whether it allows it."""
-    words = []
-    if group["prior"]["estimate"] and group["away_from_prior"] is not None:
-        away = group["away_from_prior"]
-        words.append(f"{'agrees' if away < 2.0 else 'disagrees'} with the estimate ({away:.1f} sigma)")
-    if group["beyond_captive"]:
-        words.append("captive error alone does not allow it")
-    return "; ".join(words) or "within the captive error"
+def _metadata(base: Version, task: Problem, summary: Summary, message: str) -> dict[str, str]:
+    """What the commit carries beside its rows: of the fit it starts from, and of the calibration."""
+    named = ("campaign", "facility", "provenance", "frame", "inputs", *_FIT)
+    return {k: v for k, v in base.metadata.items() if k in named} | {
+        "parent": str(base.number),
+        "trained": json.dumps(list(dict.fromkeys(c.key[0] for c in task.channels))),
+        "calibration": json.dumps(summary.to_dict()),
+        "message": message,
+    }

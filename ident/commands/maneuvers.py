@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ident.commands.shared import DB, MESSAGE, OUT, VERSION, WAIT, console_for, emit, equilibrium_of, json_to, out_file
-from ident.text import in_file_name, on_screen, visible
+from ident.text import on_screen, visible
 
 if TYPE_CHECKING:
     from ident.validation.result import Validation
@@ -99,15 +99,10 @@ def validate(
             if case
             else _all(db, version, cases, left_out, console)
         )
-    from ident.validation.figures import case_figure
-
     if samples:
         done = _with_bands(done, samples, seed, dask, console)
         board = board and _board_with_bands(board, done, out, console, figures)
-    for one in done:
-        figure = case_figure(one, out / f"{in_file_name(one.case.name)}_v{one.version}.{figures}", one.bands)
-        console.print(f"figure: {on_screen(figure)}", highlight=False)
-    for figure in _sea_figures(done, out, figures):
+    for figure in _figures(done, out, figures):
         console.print(f"figure: {on_screen(figure)}", highlight=False)
     if json_path:
         result = done[0].to_dict() if board is None else board
@@ -120,14 +115,13 @@ def validate(
         raise click.exceptions.Exit(1)
 
 
-def _sea_figures(done: list[Validation], out: Path, kind: str) -> list[Path]:
-    """Further figures of cases in waves."""
-    if not any(one.case.waves for one in done):
-        return []
-    from ident.validation.wave_case_figures import harmonics_over_depth, sea_figures
+def _figures(done: list[Validation], out: Path, kind: str) -> list[Path]:
+    """The figures of every case; on all cores where there are many."""
+    from ident.drawing import beside
+    from ident.validation.wave_case_figures import figures_of, harmonics_over_depth
 
-    own = [figure for one in done for figure in sea_figures(one, out, kind)]
-    return own + harmonics_over_depth(done, out, kind)
+    drawn = beside(figures_of, [(one, out, kind) for one in done], workers=0)
+    return [figure for figures in drawn for figure in figures] + harmonics_over_depth(done, out, kind)
 
 
 def _one(
@@ -217,7 +211,7 @@ def calibrate(
              ident calibrate my_boat.toml --no-left-out --json -
     """
     import ident
-    from ident.calibration.version import show
+    from ident.calibration.result import show
 
     console = console_for(quiet=json_path == "-")
     with console.status("calibrating") as status:
