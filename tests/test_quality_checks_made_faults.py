@@ -171,6 +171,30 @@ def test_added_inertia_of_the_wrong_sign_and_mass_left_in(evidence):
     assert left == pytest.approx(sway / mass, abs=0.006)
 
 
+def test_repeated_runs_of_a_part_are_one_load_of_it(evidence):
+    """Parts add up to the whole; runs of one part, a second time with another error, are averaged first."""
+    mass = evidence.body.mass
+
+    def repeat(runs):
+        for place in runs.index[runs["vdot"].fillna(0.0) != 0.0]:
+            again = runs.loc[place].copy()
+            again["run_id"] += "#2"
+            runs.loc[place, "Y"] *= 1.02
+            again["Y"] *= 0.98
+            runs.loc[len(runs)] = again
+
+    assert not only(evidence, ["inertia_left_in", "inertia_sign"], repeat)
+
+    def heavy(runs):
+        runs.loc[at(runs, "AC-vdot-Hull_5"), "Y"] -= mass * 0.1
+        repeat(runs)
+
+    (found,) = only(evidence, ["inertia_left_in"], heavy)
+    left = float(re.search(r"subtracted ([\d.]+) is left", found.what)[1])
+    moving = (evidence.runs["vdot"].fillna(0.0) != 0.0) & (evidence.runs["part"] != "hull")
+    assert left == pytest.approx(-evidence.runs.loc[moving, "Y"].sum() / 0.1 / mass, abs=0.006)
+
+
 def test_side_force_without_drift_and_mirror_images(evidence):
     def offset(runs):
         own = (runs["test"] == "drift_horizontal") & (runs["beta"] == 0.0)
