@@ -21,7 +21,7 @@ from ident.validation.result import ChannelError, Validation
 from ident.validation.sweep import with_grid
 from ident.validation.trial_reference import DRIVEN, TRIAL, Referenced, referenced, smoothed, with_trial
 from sim.boat.database import axis_columns, version_words
-from sim.boat.vehicle import load_vehicle
+from sim.boat.vehicle import Vehicle, load_vehicle
 from sim.files.errors import InputError
 from sim.files.record import Record
 from sim.files.schema import FrameData
@@ -233,51 +233,71 @@ def validate(
     >>> sorted(done.errors["TRIAL"])
     ['psi', 'r', 'u']
     """
+    asked = Asked(speed, depth, angle)
+    held, ship, where, notes = _held_against(case, vehicle, asked, reference, frame, trial)
+    flown = held.case
+    boat = (fleet or Fleet(os.fspath(db), version, without)).boat(ship)
+    simulation, as_started = _every_flight(held, boat, where)
+    channel_errors = errors(flown, held.series, simulation, as_started)
+    measures = measured(flown, simulation, held.series, as_started)
+    _check_numbers(measures.metrics, where)
+    model = boat.model(flown)
+    # Adds its revolutions to the metrics.
+    grid = with_grid(flown, ship, model, measures.metrics)
+    outside, constant = outside_tables(simulation, boat.coefficients, model)
+    met = _passed(flown, channel_errors) and _published_met(flown, measures.metrics)
+    return Validation(
+        case=flown,
+        simulation=simulation,
+        reference=held.series,
+        boat=boat,
+        db=os.fspath(db),
+        errors=channel_errors,
+        metrics=measures.metrics,
+        as_started=as_started,
+        outside_tables=outside,
+        constant_axes=constant,
+        curve=measures.curve,
+        grid=grid.get("grid"),
+        in_waves=measures.in_waves,
+        passed=bool(_complete(simulation) and met),
+        saturated=saturated(simulation, flown, ship),
+        notes=[*notes, *beyond_the_run(flown, held.series, simulation, as_started)],
+        metrics_sigma={k: v for k, v in held.sigma.items() if k in measures.metrics},
+    )
+
+
+def _held_against(
+    case: str | os.PathLike[str],
+    vehicle: str | os.PathLike[str] | None,
+    asked: Asked,
+    reference: str | os.PathLike[str] | None,
+    frame: str | None,
+    trial: str | os.PathLike[str] | None,
+) -> tuple[Referenced, Vehicle, str, list[str]]:
+    """The case with its references as it is to be flown, by which vehicle, the case's place, and notes."""
     flown, where = load_case(os.fspath(case))
     ship = load_vehicle(os.fspath(vehicle)) if vehicle else load_vehicle(flown.vehicle, beside=where)
-    flown, notes = for_boat(flown, where, ship, Asked(speed, depth, angle))
+    flown, notes = for_boat(flown, where, ship, asked)
     if reference is not None:
         held = _with_reference(flown, Path(reference), frame, trial)
     else:
         held = referenced(flown, where)
-    flown, series = held.case, held.series
-    unknown = check_reference(flown, series, where)
-    boat = (fleet or Fleet(os.fspath(db), version, without)).boat(ship)
-    simulation, as_started = flights(flown, boat)
+    unknown = check_reference(held.case, held.series, where)
+    return held, ship, where, [*notes, *held.notes, *unknown]
+
+
+def _every_flight(held: Referenced, boat: Boat, where: str) -> tuple[Simulation, dict[str, Simulation]]:
+    """The case flown, and flown as each source starts and as a trial was driven; each of two records or more."""
+    simulation, as_started = flights(held.case, boat)
     if held.driven is not None:
-        as_started[DRIVEN] = fly(held.driven, ship, boat.model(held.driven), boat.water(held.driven))
+        as_started[DRIVEN] = fly(held.driven, boat.vehicle, boat.model(held.driven), boat.water(held.driven))
     for one in (simulation, *as_started.values()):
         if len(one["t"]) < 2:
-            found_at = f"the run ends at {one.end[0]:.3f} s, before a second record"
-            raise InputError(f"{where}, key run", found_at, "a run of two records or more; events that happen later")
-    check_answers(simulation, flown, ship)
-    found = errors(flown, series, simulation, as_started)
-    found_on = measured(flown, simulation, series, as_started)
-    _check_numbers(found_on.metrics, where)
-    model = boat.model(flown)
-    # Adds its revolutions to the metrics.
-    grid = with_grid(flown, ship, model, found_on.metrics)
-    outside, constant = outside_tables(simulation, boat.coefficients, model)
-    met = _passed(flown, found) and _published_met(flown, found_on.metrics)
-    return Validation(
-        case=flown,
-        simulation=simulation,
-        reference=series,
-        boat=boat,
-        db=os.fspath(db),
-        errors=found,
-        metrics=found_on.metrics,
-        as_started=as_started,
-        outside_tables=outside,
-        constant_axes=constant,
-        curve=found_on.curve,
-        grid=grid.get("grid"),
-        in_waves=found_on.in_waves,
-        passed=bool(_complete(simulation) and met),
-        saturated=saturated(simulation, flown, ship),
-        notes=[*notes, *held.notes, *unknown, *beyond_the_run(flown, series, simulation, as_started)],
-        metrics_sigma={k: v for k, v in held.sigma.items() if k in found_on.metrics},
-    )
+            ended = f"the run ends at {one.end[0]:.3f} s, before a second record"
+            raise InputError(f"{where}, key run", ended, "a run of two records or more; events that happen later")
+    check_answers(simulation, held.case, boat.vehicle)
+    return simulation, as_started
 
 
 def _check_numbers(metrics: dict[str, Any], where: str) -> None:
