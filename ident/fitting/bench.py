@@ -95,8 +95,8 @@ def fitted(folder: Path, scratch: Path) -> dict[str, Any]:
     db = scratch / f"db_{folder.name}"
     shutil.rmtree(db, ignore_errors=True)
     command = [sys.executable, "-c", _FIT, str(folder), str(db)]
-    run = subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True)
-    return dict(json.loads(run.stdout.splitlines()[-1]))
+    process = subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True)
+    return dict(json.loads(process.stdout.splitlines()[-1]))
 
 
 def measure(folder: Path) -> dict[str, Any]:
@@ -134,16 +134,16 @@ def main() -> None:
     parser.add_argument("--check", action="store_true", help="exit 1 when a ratio is worse than data/fit_ratios.csv")
     parser.add_argument("--json", metavar="PATH|-", help="write the result as JSON")
     options = parser.parse_args()
-    found = measure(options.campaign)
+    costs = measure(options.campaign)
     if options.json == "-":
-        print(json.dumps(found, indent=2))
+        print(json.dumps(costs, indent=2))
     else:
-        for one in found["fits"]:
+        for one in costs["fits"]:
             print("{runs:7d} runs {seconds:7.1f} s, {processor_s:.1f} s of processor, {memory_GB:.2f} GB".format(**one))
-        print(f"ten times the runs: {found['time_ratio']:.2f} the time, {found['memory_ratio']:.2f} the memory")
+        print(f"ten times the runs: {costs['time_ratio']:.2f} the time, {costs['memory_ratio']:.2f} the memory")
         if options.json:
-            Path(options.json).write_text(json.dumps(found, indent=2) + "\n", encoding="utf-8")
-    if options.check and (said := worse(found)):
+            Path(options.json).write_text(json.dumps(costs, indent=2) + "\n", encoding="utf-8")
+    if options.check and (said := worse(costs)):
         sys.exit("the fit grows faster with the runs than recorded: " + "; ".join(said))
 
 

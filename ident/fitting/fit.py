@@ -128,7 +128,7 @@ def completed(campaign: Campaign, rows: pd.DataFrame) -> pd.DataFrame:
 
 def metadata(
     campaign: Campaign,
-    found: Identification,
+    identification: Identification,
     message: str,
     findings: list[Finding],
     estimates: list[Estimated],
@@ -148,8 +148,8 @@ def metadata(
             "conversions": json.dumps(conversions(campaign)),
             "runs": json.dumps(run_sources(campaign)),
             "options": json.dumps({"uncertainty": header.uncertainty.model_dump()}),
-            "unused": json.dumps(found.unused),
-            "warnings": json.dumps(found.warnings),
+            "unused": json.dumps(identification.unused),
+            "warnings": json.dumps(identification.warnings),
             "quality": json.dumps({k: q.model_dump() for k, q in header.quality.items()}),
             "checks": json.dumps([f.as_json() for f in findings]),
             "estimates": json.dumps([vars(e) for e in estimates]),
@@ -157,7 +157,7 @@ def metadata(
             "message": message,
         }
         | forced
-        | ({"between": json.dumps([asdict(one) for one in found.between])} if found.between else {})
+        | ({"between": json.dumps([asdict(one) for one in identification.between])} if identification.between else {})
     )
 
 
@@ -235,15 +235,15 @@ def fit(
             refuse_errors(path, findings)
     elif not any(f.severity == "error" for findings in checked for f in findings):
         raise InputError("--force", repr(force[:60]), "nothing: no check finds an error")
-    ready = [(campaign, found, database_rows(found)) for campaign, found in zip(read, identified, strict=True)]
+    ready = [(one.campaign, one, database_rows(one)) for one in identified]
     whole = [
         (rows, []) if measured_only else predicted(campaign.vehicle, rows, given_of(campaign), without)
         for campaign, _, rows in ready
     ]
     done: list[Fit] = []
-    for (campaign, found, _), (rows, estimates), findings in zip(ready, whole, checked, strict=True):
-        version, new = commit(path_of_db, rows, metadata(campaign, found, message, findings, estimates, force), wait)
-        done.append(Fit(campaign, found, rows, version, new, digest(rows), findings, estimates))
+    for (campaign, one, _), (rows, estimates), findings in zip(ready, whole, checked, strict=True):
+        version, new = commit(path_of_db, rows, metadata(campaign, one, message, findings, estimates, force), wait)
+        done.append(Fit(campaign, one, rows, version, new, digest(rows), findings, estimates))
     return Results(done)
 
 
@@ -257,14 +257,14 @@ def coefficient_table(rows: pd.DataFrame) -> list[dict[str, Any]]:
     """One row a coefficient: points, runs, worst disagreement, points by quality."""
     table = []
     for name, group in rows.groupby("coefficient", sort=False):
-        own = group[group["origin"].isin(["measured", "published"])]
-        counted = own if not own.empty else group
+        from_runs = group[group["origin"].isin(["measured", "published"])]
+        counted = from_runs if not from_runs.empty else group
         counted = counted[counted["value"] != 0.0]
         table.append(
             {
                 "coefficient": str(name),
                 "points": len(group),
-                "measured": len(own),
+                "measured": len(from_runs),
                 "runs": len({r for text in group["runs"] for r in text.split()}),
                 "estimated": int(group["estimated_by"].ne("").sum()),
                 "median_relative_error": _relative_error(counted),
@@ -293,8 +293,8 @@ def show(done: Fit, console: Console) -> None:
 
     state = "committed" if done.new else "unchanged, nothing committed: already"
     last = f"{state} version {done.version}  digest {done.digest[:16]}"
-    own = (done.identification, done.rows, done.findings, coefficient_table(done.rows))
-    for style, line in summary(*own, last, console.width):
+    table = coefficient_table(done.rows)
+    for style, line in summary(done.identification, done.rows, done.findings, table, last, console.width):
         console.print(Text(on_screen(line), style=style), no_wrap=True, overflow="crop")
     if said := _estimates_line(done.estimates):
         console.print(Text(on_screen(said)))

@@ -21,7 +21,7 @@ _NAMES = 6
 
 
 def summary(
-    found: Identification,
+    identification: Identification,
     rows: pd.DataFrame,
     findings: Sequence[Finding],
     table: list[dict[str, Any]],
@@ -32,23 +32,23 @@ def summary(
 
     Parameters
     ----------
-    found, rows, findings : Of the fit.
+    identification, rows, findings : Of the fit.
     table : Its coefficients, one row each.
     last : The last line: what was committed.
     width : Of the screen.
     """
-    width, campaign = max(width, NARROW), found.campaign
-    used = {r for n in found.nodes for r in n.runs}
+    width, campaign = max(width, NARROW), identification.campaign
+    used = {r for n in identification.nodes for r in n.runs}
     out = [("bold", cut(f"{campaign.vehicle.title}: {campaign.header.name}", width))]
     origins = ", ".join(f"{n} {word}" for word, n in rows["origin"].value_counts().items())
     out.append(("", cut(f"{len(used)} of {len(campaign.runs)} runs used; {len(table)} coefficients, {origins}", width)))
     out += [("", cut(f"  {line}", width)) for line in _known(table)]
-    out += _left_out(found, width)
-    groups = sorted(group_warnings(found.warnings), key=lambda g: -g.count)
+    out += _left_out(identification, width)
+    groups = sorted(group_warnings(identification.warnings), key=lambda g: -g.count)
     if groups:
         out.append(("", f"notes of the fit: {sum(g.count for g in groups)}"))
         out += [("yellow", cut(f"  {g.count}x {g.shown}", width)) for g in groups[:_NOTES]]
-    out += [("", cut(f"  {one.words()}", width)) for one in found.between if one.tau > 0.0]
+    out += [("", cut(f"  {one.words()}", width)) for one in identification.between if one.tau > 0.0]
     out.append(("", f"quality checks: {counted(findings)}"))
     serious = [f for f in findings if f.severity != "info"]
     colours = {"error": "red", "warning": "yellow"}
@@ -62,20 +62,20 @@ def _known(table: list[dict[str, Any]]) -> list[str]:
     known = [r for r in table if math.isfinite(r["median_relative_error"] or math.nan)]
     loose = sorted(known, key=lambda r: -r["median_relative_error"])[:_NAMES]
     apart = sorted((r for r in table if r["worst_residual"] > 2.0), key=lambda r: -r["worst_residual"])[:_NAMES]
-    found = []
+    said = []
     if loose:
         named = ", ".join(f"{r['coefficient']} {100 * r['median_relative_error']:.0f} %" for r in loose)
-        found.append(f"largest standard errors: {named}")
+        said.append(f"largest standard errors: {named}")
     if apart:
         named = ", ".join(f"{r['coefficient']} {r['worst_residual']:.1f} s.e." for r in apart)
-        found.append(f"runs that disagree most: {named}")
-    return found
+        said.append(f"runs that disagree most: {named}")
+    return said
 
 
-def _left_out(found: Identification, width: int) -> list[tuple[str, str]]:
+def _left_out(identification: Identification, width: int) -> list[tuple[str, str]]:
     """Loads that were not used, by reason."""
     reasons: dict[str, tuple[int, set[str], set[str]]] = {}
-    for left in group_unused(found.unused):
+    for left in group_unused(identification.unused):
         count, runs, files = reasons.get(left.reason, (0, set(), set()))
         reasons[left.reason] = (count + left.count, runs | set(left.runs), files | {left.file})
     if not reasons:

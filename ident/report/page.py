@@ -334,7 +334,9 @@ def write_report(
     if interactive:
         shown = [Drawn(n, *_drawn(db, n, boat.name)) for n in dict.fromkeys((number, *beside))]
         write_interactive(boat, shown, page_of_figures, path.name)
-    content = _content(db, number, boat, rows, commit, workers) | {"interactive": page_of_figures.name if interactive else ""}
+    content = _content(db, number, boat, rows, commit, workers) | {
+        "interactive": page_of_figures.name if interactive else ""
+    }
     page = templates.get_template("report.html.j2").render(content)
     with whole(path) as part:
         part.write_text(page, encoding="utf-8")
