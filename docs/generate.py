@@ -24,6 +24,7 @@ from reference_tables import axes_table, key_tables, room_tables, table
 import ident
 from ident.analysis.derivatives import derivatives
 from ident.checks.findings import rules
+from ident.commands import times
 from ident.validation.figures import case_figure
 from ident.validation.scoreboard import entries, run_all
 from sim.bench.guard import recorded
@@ -58,6 +59,16 @@ def speed() -> str:
     """Recorded times and ratios of the simulator."""
     rows = [[line.label, f"{line.value:,.3g}", line.unit] for line in recorded()]
     return table(["", "", "unit"], rows)
+
+
+def whole_commands() -> str:
+    """Recorded times of whole commands."""
+    rows = [
+        [f"`{c.command}`", f"{c.wall_s:.1f}", f"{c.processor_s:.1f}", f"{c.memory_GB:.2f}"] for c in times.recorded()
+    ]
+    if not rows:
+        return "Not recorded yet on a machine with nothing else to do."
+    return table(["command, warm", "s", "s of processor", "GB"], rows)
 
 
 def number(value: float | None) -> str:
@@ -193,7 +204,7 @@ def main() -> int:
         db = str(Path(folder) / "coeff_db")
         fitted = ident.fit(ROOT / "raw_captive_data", db)[0]
         coefficients = Coefficients(fitted.campaign.vehicle, fitted.rows)
-        readme = {"signs": signs(coefficients), "speed": speed()}
+        readme = {"signs": signs(coefficients), "speed": speed(), "commands": whole_commands()}
         boats = {"vehicles": evidence.vehicles(), "appendages": evidence.suboff_differences()}
         if not (only_check or chosen.quick):
             # A calibration takes minutes, so only a full run renews what follows from it.

@@ -29,3 +29,23 @@ def test_a_ratio_that_falls_by_more_than_a_quarter_is_named(line):
 def test_the_frozen_boat_has_the_shape_of_the_fitted_one(coefficients):
     shape = {(c.term.name, c.part): c.values.size for c in frozen_boat()}
     assert shape == {(c.term.name, c.part): c.values.size for c in coefficients}
+
+
+def test_commands_that_are_timed_are_those_of_the_command_line(tmp_path):
+    from ident.cli import main
+    from ident.commands import times
+
+    for shown, arguments in times.commands(tmp_path, tmp_path).items():
+        command = main.commands[arguments[0]]
+        options = {name for parameter in command.params for name in parameter.opts}
+        assert shown.split()[1] == arguments[0]
+        assert {a for a in arguments if a.startswith("--")} <= options
+
+
+def test_a_command_that_fails_is_not_timed():
+    import subprocess
+
+    from ident.commands import times
+
+    with pytest.raises(subprocess.CalledProcessError):
+        times.timed("nothing", ["no-such-command"])
