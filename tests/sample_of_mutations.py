@@ -2,7 +2,7 @@
 
 ``python tests/sample_of_mutations.py 10000 sample.txt`` makes so many, counts what is refused, found by a check,
 or accepted, and writes a hundred of those that nothing spoke against, each with the line that was changed and what
-became of the coefficients, to be read by eye. The suite makes a hundred (``test_slips_of_a_hand``).
+became of the coefficients, to be read by eye.
 """
 
 from __future__ import annotations

@@ -21,7 +21,6 @@ KINDS = (
     "vertical_zigzag",
     "turning_circle",
     "direct_spiral",
-    "reverse_spiral",
     "pull_out",
     "stopping",
     "roll_decay",
@@ -55,7 +54,7 @@ class Maneuver:
     @property
     def horizontal(self) -> bool:
         """Whether rudder and heading make it."""
-        turns = ("zigzag", "turning_circle", "direct_spiral", "reverse_spiral")
+        turns = ("zigzag", "turning_circle", "direct_spiral")
         return self.kind in (*turns, "pull_out", "stopping", "course_keeping")
 
     def __str__(self) -> str:
@@ -81,7 +80,7 @@ def stated(text: str) -> Maneuver:
             raise InputError("maneuver", repr(text), "a zigzag with rudder and check angle: zigzag 20/20")
         kind = "vertical_zigzag" if "vert" in low or "vzz" in low or "depth" in low else "zigzag"
         return Maneuver(kind, float(angles[1]), float(angles[2]))
-    words = {"turn": "turning_circle", "reverse": "reverse_spiral", "bech": "reverse_spiral"}
+    words = {"turn": "turning_circle"}
     words |= {"spiral": "direct_spiral", "pull": "pull_out", "stop": "stopping"}
     words |= {"roll": "roll_decay", "rise": "rise", "max q": "rise", "surfac": "rise", "depth": "depth_change"}
     words |= {"course keep": "course_keeping", "heading keep": "course_keeping"}

@@ -8,7 +8,6 @@ sampling, the bias of an extreme and the bias of smoothing.
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -24,7 +23,6 @@ from ident.trials.maneuvers import Maneuver, control_of, holds
 from ident.trials.reading import Recording
 from ident.trials.spec import TrialFile
 from sim.files.errors import InputError
-from sim.files.record import Record
 
 Array = NDArray[np.float64]
 Channels = dict[str, Array]
@@ -167,48 +165,6 @@ def _steps(one: Recording) -> list[tuple[float, float]]:
     return [(h.value, h.end) for h in levels if h.end - h.start > 5.0]
 
 
-# A step of a reverse spiral is held for longer; its rudder is that of so many seconds before its end; yaw rates are
-# ordered in steps of so much.
-_HELD_S, _MEAN_S, _RATE = 20.0, 30.0, math.radians(0.05)
-
-
-def _yaw_steps(one: Recording, paths: dict[str, SmoothPath], start: Start) -> list[tuple[float, float]]:
-    """Ordered yaw rate and end of each step of a reverse spiral, on the clock of the execute."""
-    lo, hi = max(start.time, float(paths["psi"].knots[4])), float(paths["psi"].knots[-5])
-    t = np.arange(lo, hi, 1.0)
-    rate = Record("r", t, paths["psi"](t, 1), "rad/s")
-    levels = [h for h in holds(rate) if h.end - h.start > _HELD_S]
-    if len(levels) < 2:
-        raise InputError(one.file, f"{len(levels)} yaw rates held for {_HELD_S:g} s", "the steps of a reverse spiral")
-    return [(_RATE * round(h.value / _RATE), h.end - start.time) for h in levels]
-
-
-def _reverse(one: Recording, paths: dict[str, SmoothPath], start: Start) -> Callable[[Drawn], Metrics]:
-    """The rudder of each step, with an error of its own for each draw."""
-    control = control_of(one)
-    if control is None:
-        raise InputError(one.file, "no rudder in the record", "a column of the rudder angle: it is what is measured")
-    ends = _yaw_steps(one, paths, start)
-    t, rudder = control.abscissa - start.time, control.value
-    rng = np.random.default_rng(1)
-    errors = []
-    for _, end in ends:
-        own = rudder[(t > end - _MEAN_S) & (t <= end)]
-        # What the rudder does from second to second is not independent: a pair of swings, at least, is.
-        swings = 1 + int(np.count_nonzero(np.diff(np.sign(own - own.mean()))))
-        errors.append(float(own.std()) / math.sqrt(max(swings, 2)) if own.size > 1 else 0.0)
-    # The most likely path and its second smoothing come first, and have the rudder as recorded.
-    calls = itertools.count()
-
-    def measure(drawn: Drawn) -> Metrics:
-        as_recorded = next(calls) < 2
-        away = np.zeros(len(ends)) if as_recorded else np.array(errors) * rng.standard_normal(len(ends))
-        shift = np.interp(t, [end for _, end in ends], away)
-        return turning.reverse_spiral({"t": t, "dH": rudder + shift}, ends)[0]
-
-    return measure
-
-
 def _horizontal(one: Drawn, start: Start) -> Channels:
     """Channels t, psi, r, and x and y along and across the course at the execute."""
     channels: Channels = {"t": one.time - start.time}
@@ -287,7 +243,6 @@ _NEEDS = {
     "zigzag": ("psi",),
     "vertical_zigzag": ("theta",),
     "direct_spiral": ("psi",),
-    "reverse_spiral": ("psi",),
     "pull_out": ("psi",),
     "stopping": ("north",),
     "roll_decay": ("phi",),
@@ -303,7 +258,6 @@ def _estimator(
     start: Start,
     spec: TrialFile,
     likely: Drawn,
-    paths: dict[str, SmoothPath],
 ) -> Callable[[Drawn], Metrics]:
     """The function that measures a draw."""
     missing = [c for c in _NEEDS.get(maneuver.kind, ()) if c not in likely.values]
@@ -313,8 +267,6 @@ def _estimator(
     if maneuver.kind in ("zigzag", "vertical_zigzag"):
         sense = sense_of(likely, "psi" if maneuver.kind == "zigzag" else "theta")
         return lambda drawn: _zigzag(drawn, maneuver, start, sense)
-    if maneuver.kind == "reverse_spiral":
-        return _reverse(one, paths, start)
     if maneuver.kind in ("direct_spiral", "pull_out"):
         ends = [(value, end - start.time) for value, end in _steps(one)]
         if maneuver.kind == "pull_out":
@@ -373,7 +325,7 @@ def measured(
     end = _range(paths)[1]
     grid = _grid(start.time, end)
     likely = _most_likely(paths, grid, start)
-    measure = _estimator(one, maneuver, start, spec, likely, paths)
+    measure = _estimator(one, maneuver, start, spec, likely)
     again = _most_likely({k: p.again() for k, p in paths.items()}, grid, start)
     found = with_errors(measure, likely, again, _draws(paths, grid, start, count, 0))
     return found | _approach_speed(one, paths, start)
