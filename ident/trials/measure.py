@@ -270,6 +270,9 @@ def _estimator(
     if maneuver.kind in ("direct_spiral", "pull_out"):
         ends = [(value, end - start.time) for value, end in _steps(one)]
         if maneuver.kind == "pull_out":
+            # Amidships is what is small beside the turns; what was before the execute is no step.
+            most = max((abs(value) for value, _ in ends), default=0.0)
+            ends = [(value if abs(value) > 0.1 * most else 0.0, end) for value, end in ends if end > 0.0]
             return lambda drawn: turning.pull_out(_horizontal(drawn, start), ends)
         rounded = [(math.radians(round(math.degrees(v) * 2.0) / 2.0), end) for v, end in ends]
         return lambda drawn: turning.direct_spiral(_horizontal(drawn, start), rounded)[0]
