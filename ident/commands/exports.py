@@ -1,4 +1,4 @@
-"""Commands that take a version out of the program: export."""
+"""Commands that take a version out of the program and back into it: export, import."""
 
 from __future__ import annotations
 
@@ -7,18 +7,19 @@ from typing import Any
 
 import click
 
-from ident.commands.shared import DB, VERSION, console_for, emit, equilibrium_of, json_to
+from ident.commands.shared import DB, VERSION, WAIT, console_for, emit, equilibrium_of, json_to
 from ident.text import on_screen, visible
 
 # Formats that write the coefficients, and those that write a boat in a case.
 _ROWS = ("csv", "parquet", "json")
 _FLOWN = ("c", "fmu")
+_VEHICLE = ("daveml",)
 _CASE = "hzz20"
 
 
 @click.command()
 @click.argument("path", type=click.Path(path_type=Path))
-@click.option("--format", "kind", type=click.Choice([*_ROWS, *_FLOWN]), default="csv", show_default=True)
+@click.option("--format", "kind", type=click.Choice([*_ROWS, *_FLOWN, *_VEHICLE]), default="csv", show_default=True)
 @click.option("--case", "case", default=None, help=f"With --format {', '.join(_FLOWN)}: start, water, step; {_CASE}.")
 @click.option("--vehicle", default=None, help="With --case: bundled vehicle or vehicle file, instead of the case's.")
 @click.option(
@@ -39,14 +40,17 @@ def export(
 ) -> None:
     """Write one version for other programs.
 
-    PATH is a folder. csv, parquet, json: the coefficients as a plain file. c: the boat in a case as one header and
+    PATH is a folder. csv, parquet: the coefficients as a plain file. json: the version whole, with units, frame,
+    covariance and digest, which `ident import` reads back. c: the boat in a case as one header and
     one source of C99, which step as the simulator does. fmu: the same as an FMU for co-simulation, with its sources,
-    compiled by the C compiler of this machine; PATH is FILE.fmu.
+    compiled by the C compiler of this machine; PATH is FILE.fmu. daveml: the tables of the case's vehicle with check
+    cases (ANSI/AIAA S-119); PATH is FILE.dml.
 
     \b
     Example: ident export --version 0 --format csv exported/
              ident export --format c --case ss5-4m exported/
              ident export --format fmu --case hzz20 hzz20.fmu
+             ident export --format daveml bb2.dml
     """
     if kind in _ROWS and (case or vehicle):
         raise click.UsageError(f"--case and --vehicle go with --format {', '.join(_FLOWN)}")
@@ -70,6 +74,10 @@ def _rows(path: Path, kind: str, db: str, version: int | None) -> dict[str, Any]
     from ident.output import check_folder
 
     check_folder(path)
+    if kind == "json":
+        from ident.exports.exchange import export_exchange
+
+        return export_exchange(db, version, path)
     return run(db, version, kind, path)
 
 
@@ -86,6 +94,10 @@ def _flown(
     vehicle = load_vehicle(vehicle_name) if vehicle_name else load_vehicle(case.vehicle, beside=where)
     boat = Fleet(db, version).boat(vehicle)
     with equilibrium_of(on_screen(name)):
+        if kind == "daveml":
+            from ident.exports.daveml import export_daveml
+
+            return export_daveml(boat, db, path)
         if kind == "c":
             from ident.exports.c_source import export_c
 
@@ -93,3 +105,27 @@ def _flown(
         from ident.exports.fmu import export_fmu
 
         return export_fmu(boat, case, db, path, fmi)
+
+
+@click.command("import")
+@click.argument("path", type=click.Path(path_type=Path))
+@DB
+@WAIT
+@json_to("Write what was imported as JSON.")
+def import_(path: Path, db: str, wait: float, json_path: str | None) -> None:
+    """Commit the version that an exchange file holds, to the same digest.
+
+    PATH is a file of `ident export --format json`. Rows that have another digest than it says are refused.
+
+    \b
+    Example: ident import coefficients_v0.json --db coeff_db
+    """
+    from ident.exports.exchange import import_exchange
+
+    done = import_exchange(path, db, wait)
+    if json_path != "-":
+        for one in done:
+            said = f"version {one['version']}" if one["new"] else f"the same as version {one['version']}"
+            click.echo(f"{visible(one['vehicle'])}: {said}, {one['rows']} rows, digest {one['digest'][:16]}")
+    if json_path:
+        emit({"database": db, "vehicles": done}, json_path)

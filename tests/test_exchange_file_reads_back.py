@@ -1,0 +1,54 @@
+"""Authority: the digest. What an exchange file holds is committed to the same digest, or not at all."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+from click.testing import CliRunner
+
+import ident
+from ident.cli import main
+from ident.exports.exchange import export_exchange, import_exchange, schema
+from sim.boat.database import read_rows
+from sim.files.errors import InputError
+
+
+def test_a_version_comes_back_to_its_digest(fitted_db, tmp_path):
+    done = export_exchange(fitted_db, None, tmp_path)
+    data = json.loads((tmp_path / "coefficients_v0.json").read_text("utf-8"))
+    assert set(data) <= set(schema()["properties"])
+    assert set(schema()["required"]) <= set(data)
+    assert data["units"]["beta_deg"] == "deg"
+    assert len(data["vehicles"][0]["rows"]) == done["rows"] > 100
+    assert any("correlation" in row for row in data["vehicles"][0]["rows"])
+    other = str(tmp_path / "other")
+    result = CliRunner().invoke(main, ["import", done["file"], "--db", other, "--json", "-"])
+    assert result.exit_code == 0, result.output
+    (said,) = json.loads(result.output)["vehicles"]
+    assert said["digest"] == done["database"]["digest"] == ident.Database(other)[0].digest
+    ours, theirs = read_rows(fitted_db)[0], read_rows(other)[0]
+    assert ours.equals(theirs)
+    assert not import_exchange(tmp_path / "coefficients_v0.json", other, 10.0)[0]["new"]
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda d: d["vehicles"][0]["rows"][3].update(value=1.0), "digest"),
+        (lambda d: d["vehicles"][0]["rows"][0].update(colour="red"), "colour"),
+        (lambda d: d["vehicles"][0]["rows"][0].update(value="much"), "numbers and texts"),
+        (lambda d: d.update(schema=2), "no exchange file"),
+        (lambda d: d.update(vehicles=[]), "one vehicle or more"),
+        (lambda d: d["vehicles"][0].pop("metadata"), "as the schema says"),
+    ],
+)
+def test_a_changed_file_is_refused_and_nothing_committed(fitted_db, tmp_path, change, words):
+    path = tmp_path / "coefficients_v0.json"
+    export_exchange(fitted_db, None, tmp_path)
+    data = json.loads(path.read_text("utf-8"))
+    change(data)
+    path.write_text(json.dumps(data), "utf-8")
+    with pytest.raises(InputError, match=words):
+        import_exchange(path, str(tmp_path / "other"), 10.0)
+    assert not (tmp_path / "other").exists()
