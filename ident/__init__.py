@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from ident.calibration.result import Calibrated
     from ident.calibration.version import calibrate
     from ident.captive.campaign import Campaign, read_campaign
+    from ident.cfd.batch import Batch, plan_cases
     from ident.checks.checked import Checked, check
     from ident.checks.findings import Finding
     from ident.database.compare import Change, Difference
@@ -42,6 +43,7 @@ _PLACES = {
     "read_campaign": "ident.captive.campaign",
     "check": "ident.checks.checked",
     "plan": "ident.planning.plan",
+    "plan_cases": "ident.cfd.batch",
     "fit": "ident.fitting.fit",
     "calibrate": "ident.calibration.version",
     "validate": "ident.validation.validate",
@@ -58,6 +60,7 @@ _PLACES = {
     "Finding": "ident.checks.findings",
     "Plan": "ident.planning.matrix",
     "Need": "ident.planning.matrix",
+    "Batch": "ident.cfd.batch",
     "Fit": "ident.fitting.fit",
     "Calibrated": "ident.calibration.result",
     "Validation": "ident.validation.result",
@@ -75,6 +78,7 @@ __all__ = [  # noqa: RUF022  (in the order of the work)
     "read_campaign",
     "check",
     "plan",
+    "plan_cases",
     "fit",
     "calibrate",
     "validate",
@@ -91,6 +95,7 @@ __all__ = [  # noqa: RUF022  (in the order of the work)
     "Finding",
     "Plan",
     "Need",
+    "Batch",
     "Fit",
     "Calibrated",
     "Validation",

@@ -108,7 +108,7 @@ def _digest(path: Path) -> str:
         raise InputError(str(path), f"cannot be read: {error.strerror}", "a readable file") from error
 
 
-def _sources(folder: Path, header: CampaignFile, vehicle: Vehicle) -> list[Source]:
+def _sources(folder: Path, header: CampaignFile, vehicle: Vehicle, none_yet: bool) -> list[Source]:
     """The sources a campaign declares, else one CSV or Parquet file a test beside it."""
     if header.source:
         return header.source
@@ -119,7 +119,7 @@ def _sources(folder: Path, header: CampaignFile, vehicle: Vehicle) -> list[Sourc
     # RUNS.CSV is a table as well: some systems write names in capitals.
     names = [[p.name for p in every if p.suffix.lower() == kind] for kind in (".csv", ".parquet")]
     found = [Source(files=glob.escape(name)) for kind in names for name in kind]
-    if not found:
+    if not found and not none_yet:
         raise InputError(str(folder), "no CSV file of runs", "one CSV a test beside campaign.toml, or [[source]]")
     return found
 
@@ -134,7 +134,12 @@ def _check_words(folder: Path, runs: pd.DataFrame, allowed: dict[str, list[str]]
 
 
 def read_runs(
-    folder: Path, header: CampaignFile, vehicle: Vehicle, tell: Tell = silent, spread: Spread = here
+    folder: Path,
+    header: CampaignFile,
+    vehicle: Vehicle,
+    tell: Tell = silent,
+    spread: Spread = here,
+    none_yet: bool = False,
 ) -> tuple[pd.DataFrame, Found]:
     """The checked runs of every source, in SI and radians but still in the campaign's frame.
 
@@ -144,6 +149,7 @@ def read_runs(
     header, vehicle : For the sources, the quality vocabulary and the names of the parts.
     tell : Told of every file.
     spread : Reads them.
+    none_yet : Whether a folder without files of runs is a campaign whose runs are still to come.
 
     Returns
     -------
@@ -157,7 +163,7 @@ def read_runs(
     """
     found = Found()
     words = {"test": list(tests().index), "part": vehicle.part_names(), "quality": list(header.quality)}
-    for source in _sources(folder, header, vehicle):
+    for source in _sources(folder, header, vehicle, none_yet):
         for table in source_runs(folder, source, header, found, tell, spread):
             _check_words(folder, table, {**words, "decoupled": ["", "True", "False"]})
             _check_complete(folder, table, vehicle)
@@ -227,7 +233,11 @@ def _check_complete(folder: Path, runs: pd.DataFrame, vehicle: Vehicle) -> None:
 
 
 def read_campaign(
-    folder: str | os.PathLike[str], leave_out: bool = False, tell: Tell = silent, spread: Spread = here
+    folder: str | os.PathLike[str],
+    leave_out: bool = False,
+    tell: Tell = silent,
+    spread: Spread = here,
+    none_yet: bool = False,
 ) -> Campaign:
     """Read one captive campaign and turn it to the program frame.
 
@@ -238,6 +248,7 @@ def read_campaign(
         refusing them all in one message.
     tell : Told of every file.
     spread : Reads the files and reduces their histories, here or on a cluster (``ident.cluster``).
+    none_yet : Whether a folder without files of runs is a campaign whose runs are still to come; refused else.
 
     Returns
     -------
@@ -262,7 +273,7 @@ def read_campaign(
     vehicle = load_vehicle(header.vehicle, beside=folder / "campaign.toml")
     frame = header.frame.declared(f"{where}, [frame]")
     _check_named(header, vehicle, where)
-    runs, found = read_runs(folder, header, vehicle, tell, spread)
+    runs, found = read_runs(folder, header, vehicle, tell, spread, none_yet)
     if not leave_out:
         _refuse(found.refused)
     digests = {"campaign.toml": hashlib.sha256(raw).hexdigest()}
@@ -271,6 +282,9 @@ def read_campaign(
         note(path)
         digests[path.relative_to(folder).as_posix()] = _digest(path)
     histories = (tuple(found.reduced), tuple(found.refused))
+    if runs.empty and header.source and not (none_yet or found.refused):
+        text = "runs that are back; ident runs shows how far a matrix of cases is"
+        raise InputError(where, "no file of any [[source]], all of them awaited", text)
     if runs.empty:
         return Campaign(header, vehicle, run_table({}), digests, *histories)
     runs["run_id"] = _own_names(runs)

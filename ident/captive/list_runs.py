@@ -16,15 +16,15 @@ if TYPE_CHECKING:
 _STATE = ("U", "alpha", "beta", "D0", "plane", "p", "q", "r", "udot", "vdot", "wdot", "pdot", "qdot", "rdot", "n", "J")
 
 
-def read(folder: Path) -> list[Campaign]:
-    """Every campaign at or below a folder.
+def read(folder: Path, none_yet: bool = False) -> list[Campaign]:
+    """Every campaign at or below a folder; ``none_yet`` allows one whose runs are all still to come.
 
     Raises
     ------
     sim.files.errors.InputError
         For bad input in any of them.
     """
-    return [read_campaign(path) for path in find_campaigns(folder)]
+    return [read_campaign(path, none_yet=none_yet) for path in find_campaigns(folder)]
 
 
 def as_json(campaign: Campaign) -> list[dict[str, Any]]:

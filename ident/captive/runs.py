@@ -15,12 +15,14 @@ from ident.captive.campaign_file import CampaignFile
 from ident.captive.cells import Cells, read_cells
 from ident.captive.channels import Channels, NotRising
 from ident.captive.conversions import dimensional
+from ident.captive.deduction import thrust_deduction
 from ident.captive.foam_histories import foam_channels
+from ident.captive.grids import with_discretisation
 from ident.captive.histories import Reduced, reduce
 from ident.captive.moving import axes_of, moving_body, refuse_tables
 from ident.captive.oscillation import states
 from ident.captive.quantities import Column, owner
-from ident.captive.readers.opening import matching, open_sheet, reader_of
+from ident.captive.readers.opening import matching, on_coarser_grids, open_sheet, reader_of
 from ident.captive.readers.table import Sheet, columns_of
 from ident.captive.readers.times import unit_of
 from ident.captive.run_table import REQUIRED, TEXT
@@ -92,7 +94,7 @@ def source_runs(
         uses.refuse()
     tell(f"reading {source.files}", len(paths), len(paths))
     found.tables += tables
-    found.inputs += paths
+    found.inputs += [p for path in paths for p in (path, *on_coarser_grids(path, folder, source))]
     return tables
 
 
@@ -112,6 +114,13 @@ def _read(
     try:
         if source.rows == "history":
             table, reduced = _from_histories(path, source, header, stated, where, uses)
+            if source.grids is not None:
+                others = on_coarser_grids(path, folder, source)
+                coarser = [_from_histories(p, source, header, stated, where, uses)[0] for p in others]
+                table = with_discretisation(table, coarser, source.grids.refinement, str(path))
+            if source.deduction is not None:
+                bare = _towed(folder, source, header, stated, where, uses)
+                table = thrust_deduction(table, bare, source.deduction, header.frame.frame)
             reduced = [replace(one, file=name) for one in reduced]
         else:
             table = _from_table(path, source, header, stated, where, uses)
@@ -123,6 +132,22 @@ def _read(
     table = table.assign(file=name, files=source.files, axes="body" if turned else axes_of(source, header))
     refuse_idle_quantities(table)
     return outside_excluded(table, source, where), reduced, None, uses
+
+
+def _towed(folder: Path, source: Source, header: CampaignFile, stated: Stated, where: str, uses: Uses) -> pd.DataFrame:
+    """The run without thrust that a deduction is from, with the error of its grids."""
+    assert source.deduction is not None
+    towed = source.model_copy(update={"files": source.deduction.towed, "awaited": False})
+    paths = matching(folder, towed)
+    if len(paths) != 1:
+        raise InputError(f"{where}, key source.deduction.towed", f"{len(paths)} files", "those of one run")
+    tables = [
+        _from_histories(p, towed, header, stated, where, uses)[0]
+        for p in (paths[0], *on_coarser_grids(paths[0], folder, towed))
+    ]
+    if source.grids is None:
+        return tables[0]
+    return with_discretisation(tables[0], tables[1:], source.grids.refinement, str(paths[0]))
 
 
 def _from_table(

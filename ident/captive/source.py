@@ -148,6 +148,46 @@ class Subtract(Data):
     factor: Annotated[float, Field(ge=-100, le=100)] = 1.0
 
 
+class Grids(Data):
+    """The same runs on coarser grids, from which the discretisation error of every load is estimated.
+
+    Attributes
+    ----------
+    finest : Name of the folder, in the path of the files, that stands for the finest grid: ``fine``.
+    coarser : Names of the folders with the same files on the two coarser grids, the finer of them first.
+    refinement : Ratio of cell lengths between successive grids.
+    """
+
+    finest: Annotated[str, Field(min_length=1, max_length=100)]
+    coarser: Annotated[list[Annotated[str, Field(min_length=1, max_length=100)]], Field(min_length=2, max_length=2)]
+    refinement: Annotated[float, Field(gt=1, le=10)]
+
+    @model_validator(mode="after")
+    def _three(self) -> Grids:
+        names = [self.finest, *self.coarser]
+        if len(set(names)) < 3:
+            raise ValueError("three folders of different names")
+        odd = [n for n in names if "/" in n or "\\" in n or n in (".", "..")]
+        if odd:
+            raise ValueError(f"the name of a folder, not {odd[0]!r}")
+        return self
+
+
+class Deduction(Data):
+    """The thrust deduction of a hull behind a propeller or disc of known thrust, from its towed run.
+
+    Attributes
+    ----------
+    towed : Files of the same hull at the same state without thrust: a path below the campaign folder.
+    thrust_n : Thrust, at the scale of the runs [N].
+    source : Where the thrust comes from.
+    """
+
+    towed: Annotated[str, Field(min_length=1, max_length=300)]
+    thrust_n: Annotated[float, Field(gt=0, le=1e10)]
+    source: Annotated[str, Field(min_length=1, max_length=500)]
+
+
 class Source(Data):
     """Some files of a campaign that share a format; every key is in ``docs/readers.md``.
 
@@ -191,6 +231,9 @@ class Source(Data):
     reference : What dimensionless columns were made with.
     reduction : How a time history becomes runs.
     subtract : Measured loads of parts that are taken off.
+    grids : The same histories on coarser grids: the discretisation error joins the standard errors.
+    deduction : Of the loads of a self-propelled hull: they become the thrust deduction ``t``.
+    awaited : Files that are not there yet are left out: a matrix of which some runs are still to come.
     """
 
     files: Annotated[str, Field(min_length=1, max_length=300)]
@@ -229,6 +272,9 @@ class Source(Data):
     reference: Reference | None = None
     reduction: Reduction | None = None
     subtract: list[Subtract] = Field(default_factory=list)
+    grids: Grids | None = None
+    deduction: Deduction | None = None
+    awaited: bool = False
 
     @field_validator("match", "header_pattern", "skip")
     @classmethod
@@ -280,6 +326,12 @@ class Source(Data):
             raise ValueError("no moments_about: only in an oscillation does a body move away from a fixed moment point")
         if self.reference is not None and self.normalisation != "half_rho_A":
             raise ValueError("no table reference: normalisation = 'half_rho_A' alone divides by a stated area")
+        if self.deduction is not None and (self.reduction is None or self.reduction.kind != "steady"):
+            raise ValueError("rows = 'history' and reduction.kind = 'steady': of a deduction the loads are steady")
+        if self.grids is not None and self.rows != "history":
+            raise ValueError("rows = 'history': only histories are compared between grids")
+        if self.grids is not None and self.grids.finest not in self.files.replace("\\", "/").split("/"):
+            raise ValueError(f"a folder {self.grids.finest!r} in files: grids.finest names it")
         if self.names and self.header_pattern:
             raise ValueError("one of names and header_pattern: both say what the columns are")
         if self.files.startswith(("/", "~")) or ".." in self.files.replace("\\", "/").split("/"):

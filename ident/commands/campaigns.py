@@ -85,28 +85,66 @@ def check(folder: Path, json_path: str | None, strict: bool, everything: bool) -
 
 @click.command()
 @click.argument("folder", type=click.Path(path_type=Path))
+@click.argument("cases_folder", metavar="[OUT]", type=click.Path(path_type=Path), required=False)
 @click.option("--target-rel", default=0.1, show_default=True, help="Standard error wanted, relative to a term's size.")
 @click.option("--facility", type=click.Path(path_type=Path), default=None, help="TOML file of levels and limits.")
+@click.option("--cases", type=click.Choice(["openfoam"]), default=None, help="Write a CFD case for every run into OUT.")
+@click.option("--surface", type=click.Path(path_type=Path), default=None, help="With --cases: STL file of the boat.")
+@click.option("--template", type=click.Path(path_type=Path), default=None, help="With --cases: TOML file of settings.")
 @out_file("Write the test matrix as CSV.")
 @json_to("Write terms and runs as JSON.")
-def plan(folder: Path, target_rel: float, facility: Path | None, out: Path | None, json_path: str | None) -> None:
+def plan(
+    folder: Path,
+    cases_folder: Path | None,
+    target_rel: float,
+    facility: Path | None,
+    cases: str | None,
+    surface: Path | None,
+    template: Path | None,
+    out: Path | None,
+    json_path: str | None,
+) -> None:
     """Plan the fewest runs that give every term of the vehicle a wanted standard error.
+
+    With --cases, each becomes a case folder in OUT that OpenFOAM runs as it is, beside a campaign.toml that reads
+    its output; asked again, the plan counts what came back, and writes nothing once it is enough.
 
     \b
     Example: ident plan raw_captive_data/bb2 --target-rel 0.1 --out plan.csv
+             ident plan lines/captive --cases openfoam --surface hull.stl --template template.toml cases/
     """
     import ident
     from ident.planning.matrix import show
 
     console = console_for(quiet=json_path == "-")
-    with console.status("identifying, choosing runs, identifying again with them"):
-        made = ident.plan(folder, target_rel, facility)
+    if cases is None:
+        _no_idle_options({"OUT": cases_folder, "--surface": surface, "--template": template})
+        with console.status("identifying, choosing runs, identifying again with them"):
+            made = ident.plan(folder, target_rel, facility)
+        answer = made.to_dict()
+    else:
+        if cases_folder is None or surface is None or template is None:
+            raise click.UsageError("--cases openfoam needs --surface FILE, --template FILE and a folder OUT")
+        from ident.cfd.screen import show_batch
+
+        with told() as tell:
+            batch = ident.plan_cases(folder, surface, template, cases_folder, target_rel, facility, tell)
+        made, answer = batch.plan, batch.to_dict()
     show(made, console)
+    if cases is not None:
+        show_batch(batch, console)
     if out:
         made.to_csv(out)
         console.print(f"test matrix: {on_screen(out)}", highlight=False)
     if json_path:
-        emit(made.to_dict(), json_path)
+        emit(answer, json_path)
+
+
+def _no_idle_options(given: dict[str, Path | None]) -> None:
+    """What only --cases looks at is refused without it."""
+    for name, value in given.items():
+        if value is not None:
+            raise click.UsageError(f"{name} is for --cases openfoam, which is not given")
 
 
 @click.command()
@@ -116,16 +154,29 @@ def plan(folder: Path, target_rel: float, facility: Path | None, out: Path | Non
 def runs(folder: Path, out: Path, json_path: str | None) -> None:
     """Read a campaign and show its run table; plot the time histories it reduced.
 
+    Of a folder that ident plan --cases wrote: also how far its cases are, which converged, which to start again,
+    and the end of the log of those that died.
+
     \b
     Example: ident runs raw_captive_data/ --out reports
+             ident runs cases/
     """
     from ident.captive.list_runs import as_json, read, show
+    from ident.cfd.matrix import is_matrix, read_matrix
 
     console = console_for(quiet=json_path == "-")
     with console.status("reading and reducing"):
-        found = read(folder)
+        found = read(folder, none_yet=is_matrix(folder))
     for campaign in found:
-        show(campaign, console)
+        if len(campaign.runs):
+            show(campaign, console)
+    cases = None
+    if is_matrix(folder):
+        from ident.cfd.progress import progress
+        from ident.cfd.screen import show_progress
+
+        cases = progress(read_matrix(folder), found[0])
+        show_progress(cases, console)
     histories = tuple(one for campaign in found for one in campaign.reduced)
     if histories:
         from ident.captive.history_figures import history_figures
@@ -133,4 +184,5 @@ def runs(folder: Path, out: Path, json_path: str | None) -> None:
         for path in history_figures(histories, out):
             console.print(f"figure: {on_screen(path)}", highlight=False)
     if json_path:
-        emit([row for campaign in found for row in as_json(campaign)], json_path)
+        rows = [row for campaign in found for row in as_json(campaign)]
+        emit(rows if cases is None else {"runs": rows, **cases.to_dict()}, json_path)

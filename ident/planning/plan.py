@@ -319,6 +319,23 @@ def planned_campaign(campaign: Campaign, runs: pd.DataFrame) -> Campaign:
     return replace(campaign, runs=pd.concat([campaign.runs, done], ignore_index=True))
 
 
+def promised(campaign: Campaign, runs: pd.DataFrame, target: float) -> Campaign:
+    """The campaign with runs that are under way taken as done, at the standard errors a plan gives them.
+
+    Parameters
+    ----------
+    campaign : What came back so far.
+    runs : Run table of those under way, without loads.
+    target : As for ``make_plan``.
+    """
+    problem = _Problem(campaign, identify(campaign), target)
+    runs = runs.assign(why="value", decoupled="", reason="")
+    blocks = [problem.block(run) for _, run in runs.iterrows()]
+    for output in OUTPUTS:
+        runs[f"s_{output}"] = [block.sigma.get(output, 1.0) for block in blocks]
+    return planned_campaign(campaign, runs)
+
+
 def _predict(problem: _Problem, runs: pd.DataFrame) -> tuple[Need, ...]:
     """What is wanted, with the standard errors that ``identify`` gives with the planned runs done."""
     if runs.empty:

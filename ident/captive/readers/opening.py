@@ -61,14 +61,25 @@ def matching(folder: Path, source: Source) -> list[Path]:
     Raises
     ------
     InputError
-        When there is none.
+        When there is none, and none is awaited.
     """
     try:
         # Does not follow links to folders below **, which may lead round in circles.
         found = sorted(p for p in folder.glob(source.files) if not _is_hidden(p, folder, source.files))
     except (ValueError, IndexError, NotImplementedError, re.error, OSError):
         found = []
-    if not found:
+    lost = {p: o for p in found for o in on_coarser_grids(p, folder, source) if not o.exists()}
+    if lost and not source.awaited:
+        path, other = next(iter(lost.items()))
+        raise InputError(
+            f"{folder / 'campaign.toml'}, key source.grids", f"no {other} beside {path}", "all three grids"
+        )
+    # A run that is awaited counts once it is back from all of its grids, and one of a deduction with its towed twin.
+    found = [path for path in found if path not in lost]
+    if source.awaited and source.deduction is not None:
+        towed = source.model_copy(update={"files": source.deduction.towed, "deduction": None})
+        found = found if matching(folder, towed) else []
+    if not found and not source.awaited:
         raise InputError(f"{folder / 'campaign.toml'}, key source.files", f"no file {source.files!r}", "a path or glob")
     return found
 
@@ -76,6 +87,17 @@ def matching(folder: Path, source: Source) -> list[Path]:
 def _is_hidden(path: Path, folder: Path, pattern: str) -> bool:
     """Whether a name begins with a dot that the pattern does not ask for."""
     return "/." not in f"/{pattern}" and any(part.startswith(".") for part in path.relative_to(folder).parts)
+
+
+def on_coarser_grids(path: Path, folder: Path, source: Source) -> list[Path]:
+    """The same file on the coarser grids of ``[source.grids]``, the finer of them first; empty without."""
+    if source.grids is None:
+        return []
+    parts = path.relative_to(folder).parts
+    return [
+        folder.joinpath(*(name if part == source.grids.finest else part for part in parts))
+        for name in source.grids.coarser
+    ]
 
 
 def reader_of(path: Path, source: Source) -> str:
