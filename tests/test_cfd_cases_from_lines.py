@@ -222,18 +222,16 @@ def test_runs_shows_what_came_back_and_the_log_of_a_dead_run(answered, tmp_path)
     assert not read_campaign(folder).runs["run_id"].str.startswith(dead.run_id).any()
 
 
-def test_a_batch_that_is_not_back_is_not_planned_twice(written):
-    before = read_matrix(written / "cases")
-    batch = ident.plan_cases(
-        written / "captive",
-        written / "hull.stl",
-        written / "template.toml",
-        written / "cases",
-        5.0,
-        written / "facility.toml",
-    )
+def test_a_batch_that_is_not_back_is_not_planned_twice(written, tmp_path):
+    folder = tmp_path / "lines"
+    shutil.copytree(written, folder, symlinks=True)
+    before = read_matrix(folder / "cases")
+    given = (folder / name for name in ("captive", "hull.stl", "template.toml", "cases"))
+    batch = ident.plan_cases(*given, 0.1, folder / "facility.toml")
     assert set(batch.outstanding) == {c.run_id for c in before.cases}
-    assert batch.matrix is None
+    cases = before.cases if batch.matrix is None else batch.matrix.cases
+    states = [(c.test, c.part, *sorted(c.state.items())) for c in cases]
+    assert len(set(states)) == len(states)
 
 
 # -- oscillation -------------------------------------------------------------------------------------

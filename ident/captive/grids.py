@@ -113,8 +113,8 @@ def with_discretisation(
     told: list[list[str]] = [[] for _ in range(len(out))]
     for output in (o for o in OUTPUTS if o in out):
         errors = []
-        for i, row in enumerate(zip(out[output], medium[output], coarse[output], strict=True)):
-            found = convergence(*map(float, row), refinement)
+        for i, (a, b, c) in enumerate(zip(out[output], medium[output], coarse[output], strict=True)):
+            found = convergence(float(a), float(b), float(c), refinement)
             statistical = float(out[f"s_{output}"].iloc[i]) if f"s_{output}" in out else 0.0
             errors.append(math.hypot(statistical, found.stderr))
             order = f" of order {found.order:.2g}" if found.kind == "monotonic" else ""

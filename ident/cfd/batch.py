@@ -32,8 +32,10 @@ class Batch:
     ----------
     plan : Of what is missing, with the runs that came back.
     lines : The surface, with its numbers beside the vehicle file's.
-    matrix : All cases; None where every wanted standard error is reached, and nothing was written.
+    matrix : All cases; None where nothing was written: every wanted standard error is reached, or no state of the
+        facility that is not computed yet would help.
     outstanding : Cases of earlier batches that are not back; the plan takes them as run.
+    unreached : Terms that are known worse than wanted where nothing was written.
 
     Examples
     --------
@@ -47,12 +49,19 @@ class Batch:
     lines: Lines
     matrix: Matrix | None
     outstanding: tuple[str, ...]
+    unreached: tuple[str, ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
         """For a program to read."""
         made = None if self.matrix is None else self.matrix.to_dict()
         checks = [{k: (v if v == v else None) for k, v in vars(one).items()} for one in self.lines.checks]
-        return {**self.plan.to_dict(), "surface": checks, "matrix": made, "outstanding": list(self.outstanding)}
+        return {
+            **self.plan.to_dict(),
+            "surface": checks,
+            "matrix": made,
+            "outstanding": list(self.outstanding),
+            "unreached": list(self.unreached),
+        }
 
 
 def plan_cases(
@@ -106,12 +115,25 @@ def plan_cases(
     plan = make_plan(campaign, target_rel, limits.model_copy(update={"repeats": 1}))
     wanted = [need for need in plan.needs if not need.now <= target_rel * (1.0 + 1e-6)]
     names = tuple(c.run_id for c in outstanding)
+    if is_matrix(place):
+        plan = replace(plan, runs=_fresh(plan.runs, read_matrix(place).cases, shared))
     if not wanted or plan.runs.empty:
-        return Batch(plan, lines, None, names)
+        return Batch(plan, lines, None, names, tuple(dict.fromkeys(need.name for need in wanted)))
     if shared.disc and is_matrix(place) and any(c.test == "self_propulsion" for c in read_matrix(place).cases):
         shared = shared.model_copy(update={"disc": []})
     matrix = write_matrix(plan.runs, campaign.vehicle, vehicle_file, lines, shared, place, str(made_by), tell)
     return Batch(plan, lines, matrix, names)
+
+
+def _fresh(runs: pd.DataFrame, cases: list[Case], template: Template) -> pd.DataFrame:
+    """Planned runs that no case has yet."""
+
+    def key(run: pd.Series) -> tuple[object, ...]:
+        numbers = (float(run[k]) if run[k] == run[k] else 0.0 for k in STATES)
+        return (str(run["test"]), str(run["part"]), *(float(f"{n:.6g}") + 0.0 for n in numbers))
+
+    there = {key(run) for _, run in _table(cases, template).iterrows()}
+    return runs[[key(run) not in there for _, run in runs.iterrows()]].reset_index(drop=True)
 
 
 def _campaign(folder: Path, out: Path) -> tuple[Campaign, str, set[str]]:

@@ -110,7 +110,7 @@ def write_field(path: Path, dimensions: tuple[int, int, int], inner: Any, patche
             file.internal_field = inner
             file["boundaryField"] = {}
             for name, entry in patches.items():
-                file["boundaryField"][name] = entry
+                file["boundaryField", name] = entry
 
     _once(path, [dimensions, inner, patches], make)
 

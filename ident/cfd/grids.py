@@ -69,7 +69,8 @@ def box(template: Template, surface: Mesh, length: float, grid: str, surface_z: 
     low, high = middle - reach, middle + reach
     if surface_z is not None:
         low[2] = surface_z
-    cells = tuple(max(2, math.ceil((b - a) / back - 1e-9)) for a, b in zip(low, high, strict=True))
+    # An even number: in all grids the middle of the boat lies between cells, not in one grid within them.
+    cells = tuple(2 * math.ceil((b - a) / back / 2.0 - 1e-9) for a, b in zip(low, high, strict=True))
     return Box(tuple(map(float, low)), tuple(map(float, high)), cells, wall, surface_z is not None)  # type: ignore[arg-type]
 
 

@@ -159,7 +159,7 @@ def _prepared(
     start = max((int(c.run_id[1:]) for c in matrix.cases), default=0)
     matrix.left_out = {}
     _one_depth(scaled, matrix.cases, template, lines.length, where)
-    planned = []
+    planned: list[_Written] = []
     for _, run in scaled.iterrows():
         name = f"P{start + len(planned) + 1:03d}"
         test, part = str(run["test"]), str(run["part"])
@@ -264,7 +264,8 @@ def _propelled(start: int, vehicle: Vehicle, lines: Lines, template: Template, w
     propeller = vehicle.needed_propeller("an actuator disc")
     if propeller.position is None:
         raise InputError(f"vehicle {vehicle.name}, key propeller.position", "nothing", "where the disc is")
-    ratio, out = template.surface.ratio, []
+    ratio = template.surface.ratio
+    out: list[_Written] = []
     for own in template.disc:
         speed, depth = own.speed_mps / math.sqrt(ratio), own.depth_m / ratio
         state = pd.Series({**dict.fromkeys(STATES, math.nan), "U": speed, "alpha": 0.0, "beta": 0.0, "D0": depth})

@@ -25,9 +25,18 @@ def show_batch(batch: Batch, console: Console) -> None:
         words = ["-" if math.isnan(v) else f"{v:.5g}" for v in (one.surface, one.vehicle, one.off, one.tolerance)]
         table.add_row(escape(one.name), *words)
     console.print(table)
+    if not any("by panels" in one.name for one in batch.lines.checks):
+        text = (
+            "added mass by panels is not compared: it needs the extra panels, and a surface of at most 3000 triangles"
+        )
+        console.print(f"  {text}", highlight=False)
     if batch.outstanding:
         text = f"  {len(batch.outstanding)} cases of earlier batches are not back and count as run: "
         console.print(text + " ".join(batch.outstanding[:20]), highlight=False)
+    if batch.matrix is None and batch.unreached:
+        text = "no case written: every run of the facility that would help is computed, and these are known worse"
+        console.print(f"[bold]{text}[/]: {escape(' '.join(batch.unreached))}", highlight=False)
+        return
     if batch.matrix is None:
         console.print("[bold]every wanted standard error is reached: no case written[/]", highlight=False)
         return
@@ -60,7 +69,8 @@ def show_progress(found: Progress, console: Console) -> None:
     console.print(table)
     for state in (*found.of("died"), *found.of("stopped")):
         console.print(f"[red]{state.run_id} {state.grid} {state.word}[/] in {escape(state.step)}:", highlight=False)
-        console.print(on_screen(state.end), highlight=False)
+        for line in state.end.splitlines():
+            console.print(on_screen(line), highlight=False, soft_wrap=True)
     for command, why in found.restart:
         console.print(f"  start again: {on_screen(command)}   ({escape(why)})", highlight=False)
     counts = ", ".join(

@@ -209,7 +209,8 @@ def _closed(path: Path, patches: dict[str, Mesh]) -> tuple[Mesh, tuple[frozenset
     graph = coo_matrix((np.ones(len(ends)), (ends[:, 0], ends[:, 1])), shape=(len(vertices),) * 2)
     _, label = connected_components(graph, directed=False)
     own = label[triangles[:, 0]]
-    parts, members = [], []
+    parts: list[Mesh] = []
+    members: list[frozenset[str]] = []
     for k in np.unique(own):
         t = triangles[own == k]
         used = frozenset(names[i] for i in np.unique(patch[own == k]))
