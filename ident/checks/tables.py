@@ -196,10 +196,16 @@ def configurations(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
 
 @check("essential")
 def loads_a_boat_needs(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
-    """Tests of the hull whose runs lack the loads that they are made for, as where a column was forgotten."""
+    """Tests of the hull whose runs lack the loads that they are made for, as where a column was forgotten.
+
+    A campaign of one such test gives a part of a model, from which no boat is flown: there it is a warning.
+    """
     campaign = evidence.campaign
     if campaign is None:
         return
+    made_for = [test for test, essential in tests()["essential"].items() if essential]
+    single = campaign.runs.loc[campaign.runs["test"].isin(made_for), "test"].nunique() == 1
+    severity = "warning" if single else rule.severity
     terms = vehicle_terms(campaign.vehicle)
     declared = dict(campaign.header.absent)
     for test, essential in tests()["essential"].items():
@@ -217,7 +223,7 @@ def loads_a_boat_needs(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
             if (bare or idle) and reason is None:
                 gives = f"gives {output}" if bare else f"gives a {output} that is not zero"
                 what = f"none of {len(runs)} {test} runs {gives}: the boat would have no {output} from it"
-                yield rule.finding(str(runs["file"].iloc[0]), [], [output], what)
+                yield rule.finding(str(runs["file"].iloc[0]), [], [output], what, severity)
             if not (bare or idle) and reason is not None:
                 what = f"{test}.{output} is declared absent, and {int(kept(runs, output).sum())} runs give it"
                 yield rule.finding("campaign.toml", [], ["absent"], what)
