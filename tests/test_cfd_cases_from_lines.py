@@ -36,7 +36,8 @@ TRUE = {
     "Y_deltar": 0.005,
     "N_deltar": -0.002,
 }
-ADDED = {"X_udot": -0.0005, "Y_vdot": -0.012, "Z_wdot": -0.012, "M_qdot": -0.0006, "N_rdot": -0.0006, "N_vdot": -0.0009}
+ADDED = {"X_udot": -0.0005, "Y_vdot": -0.012, "Z_wdot": -0.012, "N_vdot": -0.0009}
+ADDED |= {"K_pdot": -0.00002, "M_qdot": -0.0006, "N_rdot": -0.0006}
 # Error of second order on the finest grid, as a part of a load.
 GRID_ERROR = 0.01
 

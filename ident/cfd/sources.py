@@ -12,7 +12,6 @@ from ident.captive.campaign_file import CampaignFile
 from ident.cfd.case import Case
 from ident.cfd.motions import motion_word
 from ident.cfd.template import Template, settings
-from ident.output import whole
 from sim.boat.vehicle import Vehicle
 from sim.files.errors import InputError
 from sim.files.schema import checked
@@ -41,8 +40,10 @@ def write_campaign(out: Path, cases: Sequence[Case], vehicle: Vehicle, vehicle_f
     data["source"] = [source(case, template) for case in cases]
     checked(CampaignFile, data, str(path))
     first = "# Written by ident plan --cases: each [[source]] reads one case of cases/; runs to come are awaited.\n"
-    with whole(path) as part:
-        part.write_text(first + tomli_w.dumps(data), encoding="utf-8")
+    # A further batch reads this file and writes it anew: it takes its own place.
+    new = path.with_name(".campaign.new.toml")
+    new.write_text(first + tomli_w.dumps(data), encoding="utf-8")
+    new.replace(path)
 
 
 def header(out: Path, vehicle: Vehicle, vehicle_file: str, template: Template) -> dict[str, Any]:

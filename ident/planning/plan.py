@@ -57,7 +57,7 @@ class _Problem:
         solver.nodes, solver.values, solver.covariance = list(found.nodes), found.values, found.covariance
         solver.index = {(n.name, n.part, n.point): i for i, n in enumerate(found.nodes)}
         self.solver = solver
-        self.stderr = {k: math.sqrt(found.covariance[i, i]) for k, i in solver.index.items()}
+        self.stderr = {k: math.sqrt(max(found.covariance[i, i], 0.0)) for k, i in solver.index.items()}
         self.sizes = self._sizes()
         self._known_sizes: dict[tuple[str, str], float] = {}
         self.columns: dict[Place, int] = {}
@@ -347,6 +347,6 @@ def _predict(problem: _Problem, runs: pd.DataFrame) -> tuple[Need, ...]:
         if place not in index:
             return need
         i = index[place]
-        return replace(need, planned=math.sqrt(after.covariance[i, i]) / need.size)
+        return replace(need, planned=math.sqrt(max(after.covariance[i, i], 0.0)) / need.size)
 
     return tuple(planned(place, need) for place, need in problem.needs.items())
