@@ -11,6 +11,7 @@ from ident.estimates import carry_over as c
 from ident.estimates.downwash import tail_downwash, vortex_pair
 from sim.boat.vehicle import load_vehicle
 from sim.files.errors import InputError
+from sim.hull.lattice import horseshoes
 
 
 @pytest.fixture(scope="module")
@@ -33,7 +34,7 @@ def test_lift_slope_of_a_rectangular_wing_is_helmbolds(aspect):
     # A half wing on a wall is a whole wing of twice the span: Helmbold, within 5 %.
     grid = c.lattice([rectangle(0.5 * aspect)], (6, 6, 6))
     matrix = c.influence(grid, c.in_wall(grid.b, 0.0), c.in_wall(grid.a, 0.0))
-    load = c._normal_load(np.linalg.solve(matrix, -np.ones(len(grid.a))), grid.a, grid.b, grid.normal[0]).sum()
+    load = c.normal_load(np.linalg.solve(matrix, -np.ones(len(grid.a))), grid.a, grid.b, grid.normal[0]).sum()
     slope = 2.0 * abs(load) / (0.5 * aspect)
     helmbold = 2.0 * math.pi * aspect / (2.0 + math.sqrt(aspect**2 + 4.0))
     assert slope == pytest.approx(helmbold, rel=0.05)
@@ -45,7 +46,7 @@ def test_images_make_the_cylinder_a_stream_surface_far_downstream():
     a, b = grid.a + shifted, grid.b + shifted
     angle = np.linspace(0.1, 3.0, 13)
     on = np.stack([np.full(13, 300.0), np.cos(angle), np.sin(angle)], axis=1)
-    own = c.horseshoes(on, a, b) + c.horseshoes(on, c.in_cylinder(b, 1.0), c.in_cylinder(a, 1.0))
+    own = horseshoes(on, a, b) + horseshoes(on, c.in_cylinder(b, 1.0), c.in_cylinder(a, 1.0))
     outward = np.einsum("nmi,ni->nm", own, on * np.array([0.0, 1.0, 1.0]))
     along = np.linalg.norm(own, axis=2)
     assert np.abs(outward).max() < 1e-4 * along.max()
@@ -56,7 +57,7 @@ def test_wall_images_leave_no_flow_through_the_wall():
     lifted = np.array([0.0, 0.3, 0.0])
     a, b = grid.a + lifted, grid.b + lifted
     at = np.array([[0.4, 0.0, 0.2], [2.0, 0.0, -0.7], [9.0, 0.0, 0.1]])
-    through = c.horseshoes(at, a, b) + c.horseshoes(at, c.in_wall(b, 0.0), c.in_wall(a, 0.0))
+    through = horseshoes(at, a, b) + horseshoes(at, c.in_wall(b, 0.0), c.in_wall(a, 0.0))
     assert np.abs(through[..., 1]).max() < 1e-13
 
 

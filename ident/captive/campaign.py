@@ -69,6 +69,7 @@ class Campaign:
     reduced : The time histories that were reduced to runs, for their plots.
     refused : Those that were left out because their time stamps do not rise.
     members : Name -> campaign of several that were put together (``ident.captive.combine``).
+    folder : Where it lies, for messages.
 
     Examples
     --------
@@ -85,6 +86,7 @@ class Campaign:
     reduced: tuple[Reduced, ...] = ()
     refused: tuple[NotRising, ...] = ()
     members: dict[str, Campaign] = field(default_factory=dict)
+    folder: str = ""
 
     def _repr_html_(self) -> str:
         groups = self.runs.groupby(["file", "test", "part"], sort=False)
@@ -119,8 +121,9 @@ def _sources(folder: Path, header: CampaignFile, vehicle: Vehicle, none_yet: boo
     # RUNS.CSV is a table as well: some systems write names in capitals.
     names = [[p.name for p in every if p.suffix.lower() == kind] for kind in (".csv", ".parquet")]
     found = [Source(files=glob.escape(name)) for kind in names for name in kind]
-    if not found and not none_yet:
-        raise InputError(str(folder), "no CSV file of runs", "one CSV a test beside campaign.toml, or [[source]]")
+    if not found and not none_yet and vehicle.geometry is None:
+        allowed = "one CSV a test beside campaign.toml, or [[source]]; without runs, a vehicle with a geometry file"
+        raise InputError(str(folder), "no CSV file of runs", allowed)
     return found
 
 
@@ -286,7 +289,7 @@ def read_campaign(
         text = "runs that are back; ident runs shows how far a matrix of cases is"
         raise InputError(where, "no file of any [[source]], all of them awaited", text)
     if runs.empty:
-        return Campaign(header, vehicle, run_table({}), digests, *histories)
+        return Campaign(header, vehicle, run_table({}), digests, *histories, folder=str(folder))
     runs["run_id"] = _own_names(runs)
     runs["copy_of"] = _originals(folder, runs)
     _check_used(header, runs, where)

@@ -23,6 +23,7 @@ from ident.captive.source import Source
 from ident.checks import axes as checks_axes
 from ident.checks import copies as checks_copies
 from ident.checks import histories as checks_histories
+from ident.checks import lines as checks_lines
 from ident.checks import physics as checks_physics
 from ident.checks import possible as checks_possible
 from ident.checks import runs as checks_runs
@@ -39,7 +40,16 @@ if TYPE_CHECKING:
     from rich.table import Table
 
 # Importing a module enters its checks in the registry.
-_MODULES = (checks_axes, checks_copies, checks_histories, checks_physics, checks_possible, checks_runs, checks_tables)
+_MODULES = (
+    checks_axes,
+    checks_copies,
+    checks_histories,
+    checks_lines,
+    checks_physics,
+    checks_possible,
+    checks_runs,
+    checks_tables,
+)
 _COLOURS = {"error": "red", "warning": "yellow", "info": "cyan"}
 
 

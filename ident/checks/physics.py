@@ -27,7 +27,7 @@ def _sizes() -> list[dict[str, str]]:
         return list(csv.DictReader(stream))
 
 
-def _slope(runs: pd.DataFrame, over: str, output: str, body: Body) -> float:
+def slope(runs: pd.DataFrame, over: str, output: str, body: Body) -> float:
     """Least-squares slope of a dimensionless load over an angle [1/rad]; NaN without three angles."""
     y = prime(runs, output, body).where(kept(runs, output))
     x = runs[over].where(y.notna())
@@ -50,7 +50,7 @@ def prime_sizes(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
         low, high, output = float(size["low"]), float(size["high"]), size["output"]
         for file, group in runs.groupby(together(runs), sort=False):
             values = prime(group, output, body).where(kept(group, output))
-            value = _slope(group, size["over"], output, body) if size["over"] else float(values.median())
+            value = slope(group, size["over"], output, body) if size["over"] else float(values.median())
             value = abs(value)
             # A plane whose force along one axis is small is turned the other way, not too small.
             if not value > 0.0 or ((low <= value or bool(planes and parts == planes)) and value <= high):
@@ -168,8 +168,8 @@ def drift_or_rudder(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
     for test, (angle, force, moment, sense) in _IN_PLANE.items():
         runs = evidence.runs[(evidence.runs["test"] == test) & evidence.runs["part"].isin(["hull", ""])]
         for file, group in runs.groupby("file", sort=False):
-            lift = _slope(group, angle, force, body)
-            lever = sense * _slope(group, angle, moment, body) / lift if lift else math.nan
+            lift = slope(group, angle, force, body)
+            lever = sense * slope(group, angle, moment, body) / lift if lift else math.nan
             if rule.limits["stern"] < lever < rule.limits["aft"]:
                 what = f"{force} over {angle} acts at x = {lever:.2f} L, where a stern plane is: "
                 what += f"is {angle} the plane angle?"

@@ -32,6 +32,12 @@ if TYPE_CHECKING:
 @click.option(
     "--without", "left_out", multiple=True, metavar="NAME", help="Fly without a term or an estimate; may be repeated."
 )
+@click.option(
+    "--loads",
+    type=click.Choice(["part", "coefficient"]),
+    default=None,
+    help="With --case: loads over time by part or by term, as CSV, figure and in --json.",
+)
 @click.option("--dask", default=None, metavar="ADDRESS", help="With --samples: fly them on a Dask cluster.")
 @click.option("--vehicle", default=None, help="With --case: bundled vehicle or vehicle file, not the case's.")
 @click.option("--speed", type=click.FloatRange(min=0, min_open=True), default=None, help="With --case: U [m/s].")
@@ -64,6 +70,7 @@ def validate(
     seed: int,
     dask: str | None,
     left_out: tuple[str, ...],
+    loads: str | None,
     **own: Any,
 ) -> None:
     """Fly a maneuver from the database and compare it with its references.
@@ -72,6 +79,7 @@ def validate(
     Example: ident validate --case hzz20 --json -
              ident validate --case hzz20 --samples 1000
              ident validate --case hzz20 --without N_cross --without even_loads
+             ident validate --case hzz20 --loads part
              ident validate --case hzz20 --samples 100000 --dask tcp://scheduler:8786
              ident validate --case turn20-4m --reference mine.csv --frame program
              ident validate --case turning-circle --vehicle my_boat.toml --speed 1.5 --angle 15
@@ -84,6 +92,8 @@ def validate(
         raise click.UsageError("give either --case NAME or --all")
     if every and any(own.values()):
         raise click.UsageError("--vehicle, --speed, --depth, --angle, --reference, --frame go with --case")
+    if loads and every:
+        raise click.UsageError("--loads goes with --case")
     if cases and not every:
         raise click.UsageError("--cases goes with --all")
     if dask and not samples:
@@ -104,8 +114,9 @@ def validate(
         board = board and _board_with_bands(board, done, out, console, figures)
     for figure in _figures(done, out, figures):
         console.print(f"figure: {on_screen(figure)}", highlight=False)
+    by_source = _loads(done[0], loads, out, console) if loads else {}
     if json_path:
-        result = done[0].to_dict() if board is None else board
+        result = done[0].to_dict() | by_source if board is None else board
         emit(result | ({"without": list(left_out)} if left_out else {}), json_path)
     unfinished = [one.case.name for one in done if not one.complete]
     if unfinished:
@@ -113,6 +124,19 @@ def validate(
         raise click.exceptions.Exit(1)
     if strict and not all(one.passed for one in done):
         raise click.exceptions.Exit(1)
+
+
+def _loads(done: Validation, by: str, out: Path, console: Any) -> dict[str, Any]:
+    """Write the loads of a flight by part or term; what the JSON says of them."""
+    from ident.validation.loads import write_loads
+
+    table, data, figure = write_loads(done, by, out)
+    for path in (data, figure):
+        console.print(f"loads: {on_screen(path)}", highlight=False)
+    sources = {str(name): own.drop(columns=["t_s", "source"]) for name, own in table.groupby("source", sort=False)}
+    time = table.loc[table["source"] == table["source"].iloc[0], "t_s"]
+    listed = {name: {c: own[c].tolist() for c in own} for name, own in sources.items()}
+    return {"loads": {"by": by, "t_s": time.tolist(), "sources": listed}}
 
 
 def _figures(done: list[Validation], out: Path, kind: str) -> list[Path]:

@@ -49,6 +49,12 @@ Array = NDArray[np.float64]
 _RESIDUAL_DIGITS = 9
 
 
+def no_rows() -> pd.DataFrame:
+    """The rows of a campaign without runs: columns as ``database_rows``, with their types."""
+    kinds = {"double": float, "int64": int, "string": str}
+    return pd.DataFrame({c: pd.Series([], dtype=kinds[column_type(c)]) for c in column_order()})
+
+
 def database_rows(found: Identification) -> pd.DataFrame:
     """The rows of the database for one identified campaign, completed by symmetry.
 
@@ -66,6 +72,10 @@ def database_rows(found: Identification) -> pd.DataFrame:
         When the campaign identifies nothing, or a value is not finite.
     """
     vehicle = found.campaign.vehicle
+    if found.campaign.runs.empty:
+        where = found.campaign.folder or found.campaign.header.name
+        allowed = "one CSV a test beside campaign.toml, or [[source]]; estimates from lines do without"
+        raise InputError(where, "no CSV file of runs: the runs identify nothing", allowed)
     columns = {axis: column for column, axis in axis_columns().items()}
     factor = {k: q.factor for k, q in found.campaign.header.quality.items()}
     stderr = np.sqrt(np.clip(np.diag(found.covariance), 0.0, None))

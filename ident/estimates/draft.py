@@ -131,7 +131,7 @@ class Draft:
             raise NotApplicable(f"the term set of {self.vehicle.name} has no {term}")
         known = row_of[term]
         columns = {axis: column for column, axis in axis_columns().items()}
-        first = int(self.rows["estimate"].max()) + 1
+        first = int(self.rows["estimate"].max()) + 1 if len(self.rows) else 0
         new = []
         for i, (point, value) in enumerate(zip(points, values, strict=True)):
             place = {columns[a]: to_column(columns[a], point[a]) for a in known.axes}

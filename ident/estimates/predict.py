@@ -13,8 +13,11 @@ from typing import TYPE_CHECKING
 from ident.estimates.draft import Draft, NotApplicable
 from ident.estimates.extrapolation import extrapolation
 from ident.estimates.facility import axial_in_drift, shared_errors
+from ident.estimates.lines import from_lines
+from ident.estimates.pitching import pure_pitch
 from ident.estimates.plane_loads import carried_over, sail_planes
 from ident.estimates.potential import unmeasured
+from ident.estimates.roll import roll_damping
 from ident.estimates.saturation import saturation
 from ident.estimates.turning import Given, cross_flow, even_loads
 from sim.boat.vehicle import Vehicle
@@ -42,6 +45,12 @@ class Method:
 
 
 METHODS = (
+    Method(
+        "lines",
+        "derivatives, added mass and resistance that no run gives, from the lines",
+        "Munk (1924); Hopkins (1951); NACA Report 1307; Lamb (1932); ITTC 1957",
+        from_lines,
+    ),
     Method("shared_errors", "errors that runs have in common", "the campaign file", shared_errors),
     Method(
         "axial_in_drift",
@@ -78,6 +87,18 @@ METHODS = (
         "cross-flow along the hull where drift and rotation come together",
         "Allen and Perkins (1951); Feldman (1979); Hoerner (1965); Roshko (1961)",
         cross_flow,
+    ),
+    Method(
+        "pure_pitch",
+        "pure pitch with forward speed, where runs have it without",
+        "Allen and Perkins (1951); the campaign's runs in heave",
+        pure_pitch,
+    ),
+    Method(
+        "roll_damping",
+        "roll damping in oscillation, beyond the rates of steady runs",
+        "Graham (1980), J. Fluid Mech. 97; the campaign's runs",
+        roll_damping,
     ),
     Method(
         "even_loads",

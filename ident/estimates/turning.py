@@ -56,7 +56,8 @@ class Given:
     shared: tuple[Shared, ...] = ()
 
 
-def _hull(draft: Draft, vertical: bool = False) -> Strips:
+def hull_strips(draft: Draft, vertical: bool = False) -> Strips:
+    """Sections of the draft's hull; raises ``NotApplicable`` without its offsets."""
     try:
         return strips(draft.vehicle, vertical)
     except InputError as error:
@@ -130,7 +131,7 @@ def cross_flow(draft: Draft, given: Given) -> str:
     ):
         if draft.has(*runs) or not draft.has(term):
             continue
-        hull = _hull(draft, vertical)
+        hull = hull_strips(draft, vertical)
         literature, own = literature_drag(hull), drag_from_drift(draft, hull, term, axis, other)
         # The Birge ratio looks at the runs alone: the literature's range is not a repeat of them.
         drag = weighted_mean([literature, weighted_mean(own)]) if own else literature
@@ -147,14 +148,14 @@ def cross_flow(draft: Draft, given: Given) -> str:
     return "; ".join(said)
 
 
-def _states(draft: Draft, chosen: Mask, given: Given) -> tuple[Array, Array]:
-    """Speed ahead and yaw rate of rows of the rotating arm, by their runs; NaN where unknown."""
+def states(draft: Draft, chosen: Mask, given: Given, axis: str = "ur") -> tuple[Array, Array]:
+    """Speed ahead and rate of rows of the rotating arm, by their runs; NaN where unknown."""
     speed = np.full(len(chosen), np.nan)
     for i in np.flatnonzero(chosen):
         known = [given.speed[r] for r in str(draft.rows["runs"].iloc[i]).split() if r in given.speed]
         if known:
             speed[i] = float(np.mean(known))
-    return speed, np.abs(draft.axis("ur")) / speed
+    return speed, np.abs(draft.axis(axis)) / speed
 
 
 def _pure_yaw(draft: Draft, hull: Strips, drag: tuple[float, float], given: Given) -> str:
@@ -167,7 +168,7 @@ def _pure_yaw(draft: Draft, hull: Strips, drag: tuple[float, float], given: Give
         linear, still = draft.where([arm]), draft.where([pure])
         if not linear.any() or not still.any():
             continue
-        speed, r = _states(draft, linear, given)
+        speed, r = states(draft, linear, given)
         order = np.argsort(rate[still])
         turned = np.interp(r[linear], rate[still][order], draft.value[still][order])
         lever = (r * length / speed)[linear]

@@ -18,7 +18,7 @@ from ident.checks.findings import Finding
 from ident.cluster import cluster
 from ident.database.lock import WAIT
 from ident.database.provenance import conversions, run_sources
-from ident.database.store import commit, database_rows, digest
+from ident.database.store import commit, database_rows, digest, no_rows
 from ident.estimates.predict import Estimated, predicted
 from ident.estimates.turning import Given, Shared
 from ident.fitting.summary import summary
@@ -106,10 +106,10 @@ class Fit:
 def given_of(campaign: Campaign) -> Given:
     """What estimates need of a campaign beside its rows."""
     runs, header = campaign.runs, campaign.header
-    speed: dict[str, float] = {}
-    if header.pure_yaw:
-        arm = runs[runs["test"] == "rotating_arm"]
-        speed = {str(r): float(u) for r, u in zip(arm["run_id"], arm["U"], strict=True) if math.isfinite(float(u))}
+    arm = runs[runs["test"] == "rotating_arm"]
+    speed = {
+        str(r): float(u) for r, u in zip(arm["run_id"], arm["U"], strict=True) if math.isfinite(float(u)) and u > 0.0
+    }
     shared = []
     for one in header.shared_error:
         chosen = runs[runs["test"].isin(one.tests or runs["test"]) & runs["part"].isin(one.parts or runs["part"])]
@@ -235,16 +235,25 @@ def fit(
             refuse_errors(path, findings)
     elif not any(f.severity == "error" for findings in checked for f in findings):
         raise InputError("--force", repr(force[:60]), "nothing: no check finds an error")
-    ready = [(one.campaign, one, database_rows(one)) for one in identified]
+    ready = [(one.campaign, one, _measured(one.campaign, one, measured_only)) for one in identified]
     whole = [
         (rows, []) if measured_only else predicted(campaign.vehicle, rows, given_of(campaign), without)
         for campaign, _, rows in ready
     ]
+    for (campaign, _, _), (rows, _) in zip(ready, whole, strict=True):
+        if rows.empty:
+            nothing = "no run, and no estimate that works without"
+            raise InputError(campaign.header.name, nothing, "runs, or a vehicle whose geometry file has a hull")
     done: list[Fit] = []
     for (campaign, one, _), (rows, estimates), findings in zip(ready, whole, checked, strict=True):
         version, new = commit(path_of_db, rows, metadata(campaign, one, message, findings, estimates, force), wait)
         done.append(Fit(campaign, one, rows, version, new, digest(rows), findings, estimates))
     return Results(done)
+
+
+def _measured(campaign: Campaign, found: Identification, measured_only: bool) -> pd.DataFrame:
+    """What the runs alone give; nothing for a campaign without runs, which estimates may start from."""
+    return no_rows() if campaign.runs.empty and not measured_only else database_rows(found)
 
 
 def _relative_error(rows: pd.DataFrame) -> float | None:

@@ -90,6 +90,12 @@ class Bands:
                 self._scores[coefficient] = own - own.mean(axis=0)
         return self._scores
 
+    def values(self, rows: pd.DataFrame) -> Array:
+        """(samples, rows) values of database rows that were drawn; ``rows`` as they were flown."""
+        index, step = _row_steps(rows, correlation_matrix(rows)[0])
+        value = rows["value"].to_numpy() + np.where(index >= 0, self.draws[:, index] * step, 0.0)
+        return np.asarray(value, dtype=np.float64)
+
     def band(self, channel: str, level: str, source: str = "") -> tuple[Array, Array]:
         """Lower and upper edge of the 50 or 95 % band of a channel, as a source's record starts."""
         key = (channel, source)

@@ -111,7 +111,10 @@ def with_intervals(metrics: Columns, bands: Bands) -> Columns:
     """Metrics with the quantiles beside what was simulated, metric by metric."""
     quantiles = metric_intervals(bands)
     empty: dict[str, float | None] = {"simulated": None}
-    return {name: metrics.get(name, empty) | quantiles.get(name, {}) for name in dict.fromkeys([*metrics, *quantiles])}
+    # A metric that no sample comes to has its quantiles too, unknown.
+    unknown: dict[str, float | None] = dict.fromkeys(QUANTILES) | {"without": 1.0}
+    names = dict.fromkeys([*metrics, *quantiles])
+    return {name: metrics.get(name, empty) | quantiles.get(name, unknown) for name in names}
 
 
 def show_intervals(metrics: dict[str, dict[str, Any]], console: Console) -> None:

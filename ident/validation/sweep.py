@@ -2,15 +2,23 @@
 
 from __future__ import annotations
 
-from typing import Any
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from sim.boat.coefficients import Coefficients
 from sim.boat.vehicle import Vehicle
 from sim.flight.case import Case
-from sim.flight.simulate import initial_state
+from sim.flight.simulate import environment_of, equipped, initial_state
 from sim.flight.trim import NoEquilibrium
+from sim.kernel.assemble import Assembly
 from sim.kernel.layout import Model
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from ident.validation.bands import Bands
 
 
 def _grid(case: Case, vehicle: Vehicle, model: Model) -> list[dict[str, Any]]:
@@ -34,6 +42,25 @@ def _grid(case: Case, vehicle: Vehicle, model: Model) -> list[dict[str, Any]]:
             entry |= {k: float(v) for k, v in zip(names, values, strict=True)}
             found.append(entry | {"limited": list(trim.limited), "reason": None})
     return found
+
+
+def sampled_grid(case: Case, vehicle: Vehicle, rows: pd.DataFrame, bands: Bands) -> Bands:
+    """Bands whose metrics have the revolutions of a sweep's grid too; as they are without a sweep.
+
+    Parameters
+    ----------
+    case, vehicle, rows : What the bands were flown with.
+    bands : Of ``ident.validation.bands.fly_samples``.
+    """
+    if case.sweep is None:
+        return bands
+    assembly = Assembly(Coefficients(vehicle, rows), environment_of(case))
+    found = []
+    for own, values in zip(bands.metrics, bands.values(rows), strict=True):
+        metrics: dict[str, Any] = {}
+        with_grid(case, vehicle, equipped(case, vehicle, assembly.model(values)), metrics)
+        found.append(dict(own) | {name: columns["simulated"] for name, columns in metrics.items()})
+    return replace(bands, metrics=tuple(found))
 
 
 def with_grid(case: Case, vehicle: Vehicle, model: Model, metrics: dict[str, Any]) -> dict[str, Any]:

@@ -1,0 +1,42 @@
+"""Loads of a flight by part and by term: they add up, and balance the inertia."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from ident.validation.boats import Boat
+from ident.validation.loads import ADDED_MASS, INERTIA, WEIGHT, loads_by_part
+from sim.boat.coefficients import Coefficients
+from sim.flight.case import load_case
+from sim.flight.simulate import fly
+
+LOADS = ["X_N", "Y_N", "Z_N", "K_Nm", "M_Nm", "N_Nm"]
+
+
+@pytest.fixture(scope="module")
+def flown(campaign, rows):
+    case, _ = load_case("hzz20")
+    boat = Boat(campaign.vehicle, rows, None, Coefficients(campaign.vehicle, rows))
+    return case, boat, fly(case, campaign.vehicle, boat.model(case), None)
+
+
+def test_parts_and_inertia_balance_between_events(flown):
+    case, boat, flight = flown
+    table = loads_by_part(case, boat, flight)
+    left = table.groupby("t_s")[LOADS].sum().abs()
+    size = table[table["source"] == "hull"].set_index("t_s")[LOADS].abs().max()
+    # Accelerations are differences of the record; at an execute the planes begin to move.
+    assert (left.quantile(0.9) < 0.01 * size).all()
+
+
+def test_terms_of_a_part_add_up_to_it(flown):
+    case, boat, flight = flown
+    parts, terms = loads_by_part(case, boat, flight), loads_by_part(case, boat, flight, "coefficient")
+    own = boat.rows.loc[boat.rows["part"] == "stern_plane_1", "coefficient"].unique()
+    plane = parts[parts["source"] == "stern_plane_1"][LOADS].to_numpy()
+    added = terms[terms["source"].isin(own)].groupby("t_s")[LOADS].sum().to_numpy()
+    np.testing.assert_allclose(added, plane, rtol=1e-9, atol=1e-6 * np.abs(plane).max())
+    assert {WEIGHT, ADDED_MASS, INERTIA} <= set(terms["source"])
+    with pytest.raises(ValueError, match="part or coefficient"):
+        loads_by_part(case, boat, flight, "plane")
