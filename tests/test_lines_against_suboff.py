@@ -12,7 +12,6 @@ import pytest
 import ident
 from ident.estimates.predict import predicted
 from ident.estimates.roll import edge_drag, natural_frequency
-from ident.estimates.turning import Given
 from ident.fitting.fit import given_of
 from sim.boat.database import digest, read_rows
 from sim.boat.vehicle import load_vehicle
@@ -183,22 +182,3 @@ def test_roll_of_bb2_is_damped_more_in_oscillation_than_in_steady_runs(campaign,
     last = steady.loc[steady["p_radps"].abs().idxmax(), "value"]
     assert (new["value"] < last).all()
     assert new["stderr"].gt(0.1 * new["value"].abs()).all()
-
-
-def test_pure_pitch_keeps_the_totals_of_the_rotating_arm(campaign, rows):
-    given = given_of(campaign)
-    found, _ = predicted(campaign.vehicle, rows, given)
-    bare, _ = predicted(campaign.vehicle, rows, given, ["pure_pitch"])
-    length = campaign.vehicle.particulars.length.value
-
-    def total(version, speed, q):
-        arm, pure = (version[version["coefficient"] == name] for name in ("M_uq", "M_q|q|"))
-        linear = np.interp(speed * q, arm["uq_mps2"], arm["value"])
-        return linear * speed * q + length * np.interp(q, pure["q_radps"], pure["value"]) * q * q
-
-    for run, speed in given.speed.items():
-        own = campaign.runs[campaign.runs["run_id"] == run]
-        q = float(own["q"].iloc[0])
-        if np.isfinite(q) and q > 0.0:
-            assert total(found, speed, q) == pytest.approx(total(bare, speed, q), rel=0.05)
-    assert Given().speed == {}
