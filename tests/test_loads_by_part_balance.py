@@ -31,3 +31,14 @@ def test_terms_of_a_part_add_up_to_it(flown):
     assert {WEIGHT, ADDED_MASS, INERTIA} <= set(terms["source"])
     with pytest.raises(ValueError, match="part or coefficient"):
         loads_by_part(case, boat, flight, "plane")
+
+
+def test_every_source_adds_up_to_nothing(flown):
+    """Newton's second law: hydrodynamic loads, weight and inertia balance at every time of a flight in calm water."""
+    case, boat, flight = flown
+    table = loads_by_part(case, boat, flight)
+    left = table.groupby("t_s")[LOADS].sum()
+    largest = table.groupby("source")[LOADS].agg(lambda x: np.abs(x).max()).max()
+    # Accelerations are differences of the record, so samples beside a reversal of the rudder are not held.
+    share = (left.abs() / largest).quantile(0.9)
+    assert (share < 0.01).all(), share

@@ -19,8 +19,9 @@ from ident.text import in_file_name
 from sim.boat.catalogue import OUTPUTS
 from sim.boat.coefficients import Coefficients
 from sim.boat.mass import cross_matrix
+from sim.files.errors import InputError
 from sim.flight.case import Case
-from sim.flight.simulate import Simulation, environment_of
+from sim.flight.simulate import Simulation, begun, environment_of, uses_tanks
 from sim.kernel import rhs as kernel
 from sim.kernel.assemble import assemble
 from sim.kernel.layout import workspace
@@ -57,8 +58,13 @@ def loads_by_part(case: Case, boat: Boat, flight: Simulation, by: str = "part") 
     ------
     ValueError
         For another ``by``.
+    InputError
+        For a case with ballast or trim tank, whose weight is none of the columns.
     """
     import pandas as pd
+
+    if uses_tanks(case):
+        raise InputError(f"case {case.name}", "ballast and trim tank in use: their weight is no part", "another case")
 
     if by not in ("part", "coefficient"):
         raise ValueError(f"by {by!r}: part or coefficient")
@@ -96,8 +102,8 @@ def _loads(case: Case, boat: Boat, rows: pd.DataFrame, states: Array, controls: 
 
 def _inertia_and_weight(case: Case, boat: Boat, flight: Simulation, states: Array) -> Mapping[str, Array]:
     """Weight and buoyancy, and the inertia of water and boat against the accelerations of the record."""
-    # As it was flown: a case may shift the weight across to balance the propeller's torque.
-    model = boat.model(case)
+    # As it was flown: the weight may be shifted across to balance the propeller's torque.
+    model, *_ = begun(case, boat.vehicle, boat.model(case))
     centre = np.array(model.r_g)
     phi, theta = states[:, 9], states[:, 10]
     down = np.stack([-np.sin(theta), np.cos(theta) * np.sin(phi), np.cos(theta) * np.cos(phi)], axis=1)
