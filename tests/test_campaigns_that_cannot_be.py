@@ -77,7 +77,8 @@ def test_a_channel_of_zeros_is_missed_as_one_that_is_not_there(folder):
     drift = folder / "drift.csv"
     drift.write_text(drift.read_text().replace("-336000", "0").replace("-629000", "0"))
     (only,) = findings(folder, "essential")
-    assert only.severity == "error"
+    # Of the only test there is.
+    assert only.severity == "warning"
     assert only.columns == ("Y",)
 
 

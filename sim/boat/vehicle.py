@@ -450,7 +450,8 @@ def load_vehicle(name: str | Path, beside: str | Path = "") -> Vehicle:
     for key in ("geometry", "errata", "terms"):
         if getattr(vehicle, key) is not None:
             path = folder / getattr(vehicle, key)
-            if not path.is_file():
+            # What decides loads is there from the start; pages and surfaces are asked for by what shows them.
+            if key == "terms" and not path.is_file():
                 raise InputError(f"{where}, key {key}", f"no file {getattr(vehicle, key)[:200]!r}", "a file beside it")
             setattr(vehicle, key, str(path))
     return vehicle.turned(PROGRAM)
