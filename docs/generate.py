@@ -28,6 +28,7 @@ from ident.commands import times
 from ident.validation.figures import case_figure
 from ident.validation.scoreboard import entries, run_all
 from sim.bench.guard import recorded
+from sim.bench.step_errors import recorded as step_errors
 from sim.boat import catalogue
 from sim.boat.coefficients import Coefficients
 from sim.boat.mass import Environment
@@ -69,6 +70,15 @@ def whole_commands() -> str:
     if not rows:
         return "Not recorded yet on a machine with nothing else to do."
     return table(["command, warm", "s", "s of processor", "GB"], rows)
+
+
+def steps() -> str:
+    """What the step of each bundled case costs in accuracy."""
+    rows = []
+    for e in step_errors():
+        pairs = zip(e[2::2], e[3::2], strict=True)
+        rows.append([e.case, f"{e.step_s:g} s", *(f"{off:.2g} / {size:.3g}" for off, size in pairs)])
+    return table(["case", "step", "u, m/s", "D0, m", "theta, deg", "psi, deg", "place, m"], rows)
 
 
 def number(value: float | None) -> str:
@@ -218,6 +228,7 @@ def main() -> int:
         ROOT / "README.md": readme,
         ROOT / "docs" / "evidence.md": boats,
         ROOT / "docs" / "errata.md": {"errata": errata()},
+        ROOT / "docs" / "integration.md": {"steps": steps()},
         ROOT / "docs" / "terms.md": {"terms": term_table()},
         ROOT / "docs" / "checks.md": {"checks": check_table()},
         ROOT / "docs" / "nomenclature.md": {"axes": axes_table()},
