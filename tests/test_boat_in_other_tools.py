@@ -17,13 +17,18 @@ from ident.exports.c_source import export_c
 from ident.exports.fmu import export_fmu
 from ident.validation.boats import Fleet
 from sim.boat.catalogue import STATES
-from sim.flight.case import load_case
+from sim.flight.case import Case, load_case
 from sim.flight.plant import Plant
 from sim.flight.simulate import fly
 from sim.kernel.rhs import rhs
 from sim.waves.surroundings import prepare
 
 CASES = {"hzz20": 100.0, "ss5-4m": 20.0}
+CURRENT = {
+    "current": {"speed_mps": 1.2, "direction_deg": 70.0},
+    "layer": [{"depth_m": 20.0, "density_kgpm3": 1020.0}, {"depth_m": 90.0, "density_kgpm3": 1030.0}],
+    "hull_compressibility_perm": 1e-5,
+}
 STRICT = ("-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic", "-O1")
 # Flies the case and then the boat by commands, and prints both.
 PROGRAM = r"""
@@ -90,7 +95,20 @@ def _close(found, wanted, scale):
 
 
 def test_generated_c_compiles_without_a_warning_and_flies_as_the_simulator(flown, boat, compiler, tmp_path):
-    case, simulation = flown
+    _flies_by_c_as_the_simulator(*flown, boat, compiler, tmp_path)
+
+
+def test_generated_c_has_the_current_and_the_layers(boat, compiler, tmp_path):
+    data = _case("hzz20").model_dump(exclude_none=True)
+    data["environment"] |= CURRENT
+    data["run"]["duration_s"] = 20.0
+    case = Case.model_validate(data)
+    simulation = fly(case, boat.vehicle, boat.model(case), boat.water(case))
+    assert np.ptp(simulation["z"]) > 0.1
+    _flies_by_c_as_the_simulator(case, simulation, boat, compiler, tmp_path)
+
+
+def _flies_by_c_as_the_simulator(case, simulation, boat, compiler, tmp_path):
     done = export_c(boat, case, "coeff_db", tmp_path)
     assert [p.rsplit("/", 1)[1] for p in done["files"]] == ["bb2.h", "bb2.c"]
     (tmp_path / "main.c").write_text(PROGRAM)

@@ -22,7 +22,7 @@ from sim.boat.database import read_rows
 from sim.boat.mass import Environment, added_mass_matrix
 from sim.boat.vehicle import Vehicle, load_vehicle
 from sim.files.errors import InputError
-from sim.flight.case import load_case
+from sim.flight.case import Case, load_case
 from sim.flight.simulate import environment_of, mixer_of, plane_limits
 from sim.flight.trim import NoEquilibrium, self_propulsion
 from sim.kernel import rhs as kernel
@@ -361,6 +361,15 @@ def stability_at(coefficients: Coefficients, environment: Environment, speed: fl
     )
 
 
+def _the_same_at_every_depth(case: Case) -> Environment:
+    """Water of a case; a current carries the boat and changes no derivative, but layers would."""
+    water = case.environment
+    if water.layer or water.hull_compressibility_perm:
+        key = "layer" if water.layer else "hull_compressibility_perm"
+        raise InputError(f"case {case.name}, environment.{key}", "density or volume over depth", "a case without it")
+    return environment_of(case)
+
+
 def stability(
     case: str | os.PathLike[str],
     db: str | os.PathLike[str] = "coeff_db",
@@ -412,7 +421,7 @@ def stability(
     speeds = speeds or tuple(sorted(drift["speed_mps"].dropna().unique())) or (data.initial.speed_mps,)
     depths = depths or tuple(sorted(drift["depth_m"].dropna().unique())) or (data.initial.depth_m,)
     coefficients = Coefficients(vehicle, rows)
-    environment = environment_of(data)
+    environment = _the_same_at_every_depth(data)
     found = []
     for depth in depths:
         for speed in speeds:

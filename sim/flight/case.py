@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from importlib.resources import files
+from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -40,13 +41,43 @@ Maneuver = Literal[
 _MOST_STEPS = 1e7
 
 
+class CurrentData(Data):
+    """A steady current, the same everywhere.
+
+    Attributes
+    ----------
+    speed_mps : Of the water over ground [m/s].
+    direction_deg : Where it flows to, clockwise from north [deg]; a case starts along north.
+    """
+
+    speed_mps: Annotated[float, Field(ge=0, le=10)]
+    direction_deg: float
+
+
+class LayerData(Data):
+    """Density of the water at a depth; linear between two depths, held beyond them.
+
+    Attributes
+    ----------
+    depth_m : Of the body origin [m].
+    density_kgpm3 : There [kg/m^3].
+    """
+
+    depth_m: Annotated[float, Field(ge=0)]
+    density_kgpm3: Positive
+
+
 class EnvironmentData(Data):
     """Water density and gravity.
 
     Attributes
     ----------
-    density_kgpm3 : Of the water [kg/m^3].
+    density_kgpm3 : Of the water [kg/m^3]; where there are layers, that of the tables' loads and of the hull's stated
+        displacement.
     gravity_mps2 : Gravity [m/s^2].
+    current : Of the water; velocities of the boat are then through the water, its place over ground.
+    layer : Density over depth: buoyancy and loads follow it, the added mass does not.
+    hull_compressibility_perm : Share of its volume that the hull loses a metre of depth [1/m].
     free_surface : The hull may come out of the water and loses buoyancy and added mass there; always so in
         waves, which need the vehicle's geometry alike.
     """
@@ -54,6 +85,23 @@ class EnvironmentData(Data):
     density_kgpm3: Positive
     gravity_mps2: Positive
     free_surface: bool = False
+    current: CurrentData | None = None
+    layer: Annotated[list[LayerData], Field(max_length=8)] = Field(default_factory=list)
+    hull_compressibility_perm: Annotated[float, Field(ge=0, le=1e-3)] = 0.0
+
+    @model_validator(mode="after")
+    def _deep_where_it_varies(self) -> EnvironmentData:
+        depths = [one.depth_m for one in self.layer]
+        if any(b <= a for a, b in pairwise(depths)):
+            raise ValueError("layers stand from shallow to deep, each at a depth of its own")
+        if self.free_surface and self.varies:
+            raise ValueError("current, layer and hull_compressibility_perm are for deep water, without free_surface")
+        return self
+
+    @property
+    def varies(self) -> bool:
+        """Whether there is a current, or anything that changes over depth."""
+        return bool(self.current or self.layer or self.hull_compressibility_perm)
 
 
 class WavesData(Data):
@@ -309,6 +357,12 @@ class Case(Data):
     reference: Reference | None = None
     published: list[Published] = Field(default_factory=list)
     tolerance: list[Tolerance] = Field(default_factory=list)
+
+    @model_validator(mode="after")
+    def _no_waves_on_a_current(self) -> Case:
+        if self.waves and self.environment.varies:
+            raise ValueError("waves on a current or over layers are not modelled; one of them in a case")
+        return self
 
     @model_validator(mode="after")
     def _changes_depth_by_something(self) -> Case:

@@ -72,7 +72,7 @@ class LineOfSight:
         point = self._point(state)
         phi, theta, psi = (state[..., k] for k in (9, 10, 11))
         u, v, w = (state[..., k] for k in (0, 1, 2))
-        # Velocity over ground in the horizontal plane, Euler angles 3-2-1.
+        # Velocity through the water in the horizontal plane, Euler angles 3-2-1.
         along = np.cos(theta) * u + np.sin(theta) * (np.sin(phi) * v + np.cos(phi) * w)
         across = np.cos(phi) * v - np.sin(phi) * w
         course = psi + np.arctan2(across, along)

@@ -17,7 +17,8 @@ from sim.flight.case import Case, load_case
 from sim.flight.commands import Commands, PlaneCommand, SpeedCommand
 from sim.flight.craft import Craft
 from sim.flight.simulate import TANKS, begun, columns_of, uses_tanks
-from sim.kernel.layout import workspace
+from sim.kernel.assemble import without_thrust
+from sim.kernel.layout import OUTSIDE, Model, workspace
 from sim.waves.in_waves import surroundings
 
 Array = NDArray[np.float64]
@@ -90,6 +91,9 @@ class Plant:
         craft, case = Craft(coefficients), _open_loop(case)
         self._water, model = craft.water(case), craft.model(case)
         self._model, self._start, self._moved, self.trim, self._settings = begun(case, self.vehicle, model)
+        # What is broken: angles at which planes are stuck [rad], and the model of the whole boat.
+        self._stuck: dict[int, float] = {}
+        self._whole = self._model
         self._columns = columns_of(self.vehicle, uses_tanks(case))[1:-2]
         self.reset()
 
@@ -117,12 +121,13 @@ class Plant:
         return cls(data, Coefficients(boat, read_rows(str(db), version, boat.name)[0]))
 
     def reset(self, state: ArrayLike | None = None, controls: ArrayLike | None = None) -> None:
-        """Back to time zero and the commands of the start.
+        """Back to time zero and the commands of the start, without loads from outside; what is broken stays so.
 
         Parameters
         ----------
         state : (12,) to start from, that of the case when None; SI and radians.
         controls : Deflections [rad], n [1/s] and tanks as they are then, likewise; commands stay those of the case.
+            Planes that are stuck are where they stuck, unless given here.
 
         Raises
         ------
@@ -132,6 +137,8 @@ class Plant:
         # Start of the present control sample, and what is left of it.
         self._sample, self._left, self.time = 0.0, self.dt, 0.0
         y, moved = _given("state", state, self._start), _given("controls", controls, self._moved)
+        for place, angle in self._stuck.items():
+            moved[place] = moved[place] if controls is not None else angle
         around = surroundings(self._water, self._model.added_mass) if self._water else ()
         self._work = workspace(self._model, around)
         self._flight = maneuver.flight_of(self._model, self._settings, self._work, y, moved)
@@ -141,6 +148,8 @@ class Plant:
         self._rate = np.zeros(moved.size)
         for name in self.commands:
             self._give(name)
+        for place in self._stuck:
+            self._hold(place)
 
     @property
     def state(self) -> Array:
@@ -151,6 +160,11 @@ class Plant:
     def controls(self) -> Array:
         """(planes + 1,) deflections [rad] and n [1/s] as they are; with tanks two more [kg, m]."""
         return self._flight.c
+
+    @property
+    def loads(self) -> Array:
+        """(6,) X Y Z K M N from outside, body axes [N, N m]: a tow, a tether, a blast; its numbers may be changed."""
+        return self._work.real[OUTSIDE : OUTSIDE + 6]
 
     def __getitem__(self, channel: str) -> float:
         """A state, a plane, n, ballast or trim_tank by name; ``t``, ``U`` and ``D0`` too.
@@ -230,6 +244,53 @@ class Plant:
             self._left = self.dt if ends else self._left - part
             self.time = self._sample if ends else self._sample + (self.dt - self._left)
         return self.state.copy()
+
+    def stick(self, plane: str, angle: float | None = None) -> None:
+        """Let a plane stay where it is, or at an angle [rad], whatever is commanded.
+
+        Raises
+        ------
+        InputError
+            For a plane that the boat does not have, or an angle beyond its limit.
+        """
+        names = [p.name for p in self.vehicle.planes]
+        if plane not in names:
+            raise InputError(f"plant, plane {plane}", "no such plane of this boat", ", ".join(names))
+        place = names.index(plane)
+        if angle is not None:
+            limit = float(self._settings.plane_limit[place])
+            if not abs(angle) <= limit:
+                raise InputError(f"plant, plane {plane}", f"an angle of {angle} rad", f"up to {limit:g} rad")
+            self.controls[place] = angle
+        self._stuck[place] = float(self.controls[place])
+        self._hold(place)
+
+    def lose_thrust(self, share: float) -> None:
+        """Let the propeller lose a share of its thrust and torque, as without some of its blades.
+
+        Raises
+        ------
+        InputError
+            For a share that is not between 0 and 1.
+        """
+        if not 0.0 <= share <= 1.0:
+            raise InputError("plant, lost thrust", f"{share}", "a share between 0 and 1")
+        self._become(without_thrust(self._whole, share))
+
+    def repair(self) -> None:
+        """Planes move and the propeller pushes again."""
+        self._stuck.clear()
+        self._flight.g[:] = orders.flat(self._settings)[0]
+        self._become(self._whole)
+
+    def _become(self, model: Model) -> None:
+        """Go on as another model of the same layout."""
+        self._model = model
+        self._flight = self._flight._replace(m=model.real, w=model.whole)
+
+    def _hold(self, place: int) -> None:
+        """Take a plane's rate from it."""
+        self._flight.g[orders.PLANES + orders.PLANE * place + 3] = 0.0
 
     def _take(self, commands: dict[str, float]) -> None:
         for name, value in commands.items():

@@ -339,14 +339,31 @@ def environment_of(case: Case) -> Environment:
     return Environment(case.environment.density_kgpm3, case.environment.gravity_mps2)
 
 
+def _in_water(case: Case, model: Model) -> Model:
+    """The model in a current, layers of density, and a hull that is pressed together."""
+    water = case.environment
+    if water.current:
+        direction = math.radians(water.current.direction_deg)
+        speed = water.current.speed_mps
+        model = model.replaced(current=(speed * math.cos(direction), speed * math.sin(direction)))
+    if water.layer or water.hull_compressibility_perm:
+        depths = [one.depth_m for one in water.layer] or [0.0]
+        ratios = [one.density_kgpm3 / water.density_kgpm3 for one in water.layer] or [1.0]
+        model = model.layered(np.array(depths), np.array(ratios))
+        model = model.replaced(compressibility=water.hull_compressibility_perm)
+    return model
+
+
 def equipped(case: Case, vehicle: Vehicle, model: Model) -> Model:
-    """An assembled model with tanks, when the case uses them.
+    """An assembled model in the water of a case, with tanks when the case uses them.
 
     Raises
     ------
     InputError
         When the vehicle has no tanks.
     """
+    if case.environment.varies:
+        model = _in_water(case, model)
     if not uses_tanks(case):
         return model
     if vehicle.tanks is None:

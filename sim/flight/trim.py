@@ -118,7 +118,8 @@ def _solve(
             f"no self-propulsion state at {speed:.4g} m/s and D0 = {depth:.4g} m; {_closest(state, controls, mixer)}"
         )
     # The path is straight: heading such that the course is along earth x.
-    state[11] = -np.arctan2(derivative[7], derivative[6])
+    # Along north through the water, whatever carries it.
+    state[11] = -np.arctan2(derivative[7] - model.current[1], derivative[6] - model.current[0])
     lateral = float(x[3]) if upright else 0.0
     return Trim(state, controls, float(level[DV]), float(x[5]), left, lateral=lateral), wrong
 

@@ -157,6 +157,22 @@ def weight_across(model: Model, lateral: float) -> Model:
     )
 
 
+def without_thrust(model: Model, share: float) -> Model:
+    """The model with a share of the propeller's thrust and torque lost: of KT and KQ, or of a ship's k_0 to k_2."""
+    other = model.replaced()
+    kept, data = 1.0 - share, other.data
+    data[:, layout.OUT_THRUST] *= kept
+    turning = {BOAT_FEATURES.index("n"), BOAT_FEATURES.index("|n|")}
+    ends = [*(g.first for g in model.groups[1:]), model.rows]
+    slot = OUTPUTS.index("K")
+    for group, end in zip(model.groups, ends, strict=True):
+        if turning <= set(model.multipliers[group.multipliers[slot]].tolist()):
+            data[group.first : end, slot] *= kept
+    for name in ("k_0", "k_1", "k_2"):
+        other.ship[layout.SHIP_PLACES.index(name)] *= kept
+    return other
+
+
 def _batches(coefficients: Coefficients) -> Iterable[list[Coefficient]]:
     """Coefficients that share their axes, one a slot, in the order of the kernel."""
     groups: dict[tuple[object, ...], list[list[Coefficient]]] = {}

@@ -48,7 +48,11 @@ SHIP_TERMS = (
     *("t_R", "a_H", "x_H", "gamma_R+", "gamma_R-", "l_R", "kappa", "epsilon", "f_alpha", "C_T1"),
 )
 SHIP_PLACES = (*SHIP_TERMS, "J_0 D", "density", "length", "A_R", "H_R", "x_R")
-PLANES = SHIP + len(SHIP_PLACES)
+# Velocity of the water over ground, north and east [m/s]; share of its volume that the hull loses a metre
+# of depth; depths of density [m] with its ratio to the case's.
+CURRENT = SHIP + len(SHIP_PLACES)
+COMPRESSIBILITY, LAYERS, MOST_LAYERS = CURRENT + 2, CURRENT + 3, 8
+PLANES = LAYERS + 2 * MOST_LAYERS
 PLANE_WIDTH = 6
 
 # Model, whole numbers: how many there are, then where they start, in floats or in whole numbers.
@@ -61,15 +65,17 @@ AT_AXES, AT_MULTIPLIERS, AT_GROUPS, AT_DATA = 10, 11, 12, 13
 AT_FRACTIONS, AT_PRODUCTS, SCRATCH = 14, 15, 16
 # A ship's propeller and rudder, and the rudder's place among the planes; heave, roll and pitch that are held.
 HAS_PROPELLER, HAS_RUDDER, RUDDER, HELD = 17, 18, 19, 20
-HEADER = 21
+# Depths at which the density is given; with none of them water and hull are the same everywhere.
+N_LAYERS = 21
+HEADER = 22
 # An axis: feature, rule, first node, nodes, first cell. A cell: range, origin, slope and base.
 AXIS, CELL = 5, 5
 # Factors of a multiplier.
 MAX_FACTORS = 4
 
-# Scratch, floats: eight outputs, a linear system, the shift of the weight to starboard [m], then the
-# features.
-LOADS, SYSTEM, SHIFT, FEATURES = 0, 8, 50, 56
+# Scratch, floats: eight outputs, a linear system, the shift of the weight to starboard [m], loads from
+# outside [N, N m], then the features.
+LOADS, SYSTEM, SHIFT, OUTSIDE, FEATURES = 0, 8, 50, 51, 64
 N_BOAT, N_PLANE = len(BOAT_FEATURES), len(PLANE_FEATURES)
 FIRST_PLANE = FEATURES + N_BOAT
 
@@ -138,6 +144,7 @@ class Model:
         where a motion is held. ship : of ``SHIP_PLACES``; zero for what a vehicle does not have.
     planes : (planes, 6) position [m] and lift axis. has_tanks : Whether they are in use.
     data : (rows, 8) dimensional coefficients at the nodes.
+    current : (2,) north and east [m/s]. compressibility : Of the hull's volume [1/m].
     """
 
     real: Array
@@ -153,6 +160,7 @@ class Model:
     r_g, r_b, inertia, tank = _Block(R_G, 3), _Block(R_B, 3), _Block(INERTIA, 6), _Block(TANK, 3)
     inverse_mass, mass_matrix = _Block(INVERSE_MASS, 6, 6), _Block(MASS_MATRIX, 6, 6)
     added_mass, ship = _Block(ADDED_MASS, 6, 6), _Block(SHIP, len(SHIP_PLACES))
+    current, compressibility = _Block(CURRENT, 2), _Scalar(COMPRESSIBILITY)
 
     @property
     def planes(self) -> Array:
@@ -175,6 +183,19 @@ class Model:
     def held(self) -> list[int]:
         """Heave, roll and pitch that are held, as places of u v w p q r."""
         return [i for i in range(6) if int(self.whole[HELD]) & (1 << i)]
+
+    def layered(self, depths: Array, ratios: Array) -> Model:
+        """A copy in water whose density is given over depth.
+
+        Parameters
+        ----------
+        depths : (n,) of the body origin, ascending, ``MOST_LAYERS`` at most [m].
+        ratios : (n,) of the density there to that of the model.
+        """
+        other = self.replaced()
+        other.whole[N_LAYERS] = len(depths)
+        other.real[LAYERS : LAYERS + 2 * len(depths)] = np.column_stack([depths, ratios]).ravel()
+        return other
 
     def replaced(self, tanks: bool | None = None, **values: Any) -> Model:
         """A copy with some of its numbers changed, by name."""

@@ -17,6 +17,7 @@ from sim.compiled import inlined, outer
 from sim.kernel.inertia import accelerate, add_tank_loads
 from sim.kernel.layout import (
     BUOYANCY,
+    CURRENT,
     DIAMETER,
     FEATURES,
     FIRST_PLANE,
@@ -25,9 +26,11 @@ from sim.kernel.layout import (
     INERTIA,
     LOADS,
     MASS,
+    N_LAYERS,
     N_PLANE,
     N_PLANES,
     N_STATES,
+    OUTSIDE,
     PLANE_WIDTH,
     PLANES,
     R_B,
@@ -44,6 +47,7 @@ from sim.kernel.layout import (
 )
 from sim.kernel.ship import LOADING, add_ship_loads, fill_slipstream
 from sim.kernel.tables import add_up_loads
+from sim.kernel.water import scale_by_depth
 from sim.waves.surroundings import add_loads, near_of, observe, plane_inflow, propeller_inflow, relative, tick
 
 # Places of the features of the catalogue in the scratch.
@@ -146,6 +150,11 @@ def _rate(
     observe(near, y)
     _features(m, w, y, c, near, s)
     _loads(m, w, s, k)
+    buoyancy = m[BUOYANCY]
+    if w[N_LAYERS]:
+        buoyancy *= scale_by_depth(m, w, y[Z], s)
+    for i in range(6):
+        s[LOADS + i] += s[OUTSIDE + i]
     if w[HAS_TANKS]:
         add_tank_loads(m, w, y, c, s)
     add_loads(near, y, s)
@@ -153,7 +162,7 @@ def _rate(
     phi, theta, psi = y[9], y[10], y[11]
     sf, cf, st, ct, sp, cp = sin(phi), cos(phi), sin(theta), cos(theta), sin(psi), cos(psi)
     gx, gy, gz = -st, ct * sf, ct * cf
-    mass, weight, buoyancy = m[MASS], m[WEIGHT], m[BUOYANCY]
+    mass, weight = m[MASS], m[WEIGHT]
     xg, yg, zg = m[R_G], m[R_G + 1] + s[SHIFT], m[R_G + 2]
     xb, yb, zb = m[R_B], m[R_B + 1], m[R_B + 2]
     net = weight - buoyancy
@@ -172,8 +181,8 @@ def _rate(
     f4 = s[LOADS + 4] + mz * gx - mx * gz - (r * hx - p * hz) - mass * (zg * cx - xg * cz)
     f5 = s[LOADS + 5] + mx * gy - my * gx - (p * hy - q * hx) - mass * (xg * cy - yg * cx)
     accelerate(m, w, c, (f0, f1, f2, f3, f4, f5), near, s, dy)
-    dy[6] = ct * cp * u + (sf * st * cp - cf * sp) * v + (cf * st * cp + sf * sp) * w_
-    dy[7] = ct * sp * u + (sf * st * sp + cf * cp) * v + (cf * st * sp - sf * cp) * w_
+    dy[6] = ct * cp * u + (sf * st * cp - cf * sp) * v + (cf * st * cp + sf * sp) * w_ + m[CURRENT]
+    dy[7] = ct * sp * u + (sf * st * sp + cf * cp) * v + (cf * st * sp - sf * cp) * w_ + m[CURRENT + 1]
     dy[8] = -st * u + sf * ct * v + cf * ct * w_
     dy[9] = p + (sf * q + cf * r) * st / ct
     dy[10] = cf * q - sf * r
