@@ -8,7 +8,7 @@ import pytest
 from ident.validation.boats import Boat
 from ident.validation.loads import ADDED_MASS, INERTIA, WEIGHT, loads_by_part
 from sim.boat.coefficients import Coefficients
-from sim.flight.case import load_case
+from sim.flight.case import Case, load_case
 from sim.flight.simulate import fly
 
 LOADS = ["X_N", "Y_N", "Z_N", "K_Nm", "M_Nm", "N_Nm"]
@@ -42,3 +42,18 @@ def test_every_source_adds_up_to_nothing(flown):
     # Accelerations are differences of the record, so samples beside a reversal of the rudder are not held.
     share = (left.abs() / largest).quantile(0.9)
     assert (share < 0.01).all(), share
+
+
+def test_they_balance_over_layers_and_in_a_pressed_hull(flown):
+    """What is left of the sum of all sources, against the largest of them."""
+    case, boat, _ = flown
+    data = case.model_dump(exclude_none=True)
+    layers = [{"depth_m": 20.0, "density_kgpm3": 900.0}, {"depth_m": 60.0, "density_kgpm3": 950.0}]
+    data["environment"] |= {"layer": layers, "hull_compressibility_perm": 1e-4}
+    data["initial"] |= {"state": "as_given", "upright": False}
+    data["run"]["duration_s"] = 15.0
+    case = Case.model_validate(data)
+    table = loads_by_part(case, boat, fly(case, boat.vehicle, boat.model(case), None))
+    total = table.groupby("t_s")[LOADS].sum().to_numpy()[5:-5]
+    largest = table[LOADS].abs().max().to_numpy()
+    assert (np.abs(total).max(axis=0) < 0.02 * largest).all()

@@ -25,6 +25,7 @@ from sim.flight.simulate import Simulation, begun, environment_of, uses_tanks
 from sim.kernel import rhs as kernel
 from sim.kernel.assemble import assemble
 from sim.kernel.layout import workspace
+from sim.kernel.water import shares_at
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -90,14 +91,14 @@ def loads_by_part(case: Case, boat: Boat, flight: Simulation, by: str = "part") 
 
 
 def _loads(case: Case, boat: Boat, rows: pd.DataFrame, states: Array, controls: Array) -> Array:
-    """(samples, 6) loads of some of the rows in calm water."""
+    """(samples, 6) loads of some of the rows in calm water of the density at each depth."""
     model = assemble(Coefficients(boat.vehicle, rows.reset_index(drop=True)), environment_of(case))
     work = workspace(model)
     out = np.zeros((len(states), 6))
     for i, (state, control) in enumerate(zip(states, controls, strict=True)):
         kernel.features(model, np.ascontiguousarray(state), np.ascontiguousarray(control), work)
         out[i] = kernel.loads(model, work)[:6]
-    return out
+    return out * shares_at(boat.model(case), states[:, 8])[0][:, None]
 
 
 def _inertia_and_weight(case: Case, boat: Boat, flight: Simulation, states: Array) -> Mapping[str, Array]:
@@ -107,7 +108,8 @@ def _inertia_and_weight(case: Case, boat: Boat, flight: Simulation, states: Arra
     centre = np.array(model.r_g)
     phi, theta = states[:, 9], states[:, 10]
     down = np.stack([-np.sin(theta), np.cos(theta) * np.sin(phi), np.cos(theta) * np.cos(phi)], axis=1)
-    moment = np.cross(centre * model.weight - np.array(model.r_b) * model.buoyancy, down)
+    buoyancy = model.buoyancy * shares_at(model, states[:, 8])[1][:, None]
+    moment = np.cross(centre * model.weight - np.array(model.r_b) * buoyancy, down)
     rate = np.gradient(states[:, :6], flight["t"], axis=0)
     v, omega = states[:, :3], states[:, 3:6]
     ixx, iyy, izz, ixy, ixz, iyz = model.inertia
@@ -115,7 +117,7 @@ def _inertia_and_weight(case: Case, boat: Boat, flight: Simulation, states: Arra
     turned = model.mass * (np.cross(omega, v) + np.einsum("nij,j->ni", _twice(omega), centre))
     spun = np.cross(omega, omega @ inertia) + model.mass * np.cross(centre, np.cross(omega, v))
     return {
-        WEIGHT: np.concatenate([(model.weight - model.buoyancy) * down, moment], axis=1),
+        WEIGHT: np.concatenate([(model.weight - buoyancy) * down, moment], axis=1),
         ADDED_MASS: -rate @ model.added_mass.T,
         INERTIA: -rate @ (model.mass_matrix - model.added_mass).T - np.concatenate([turned, spun], axis=1),
     }

@@ -1,11 +1,12 @@
-"""Water that is not the same at every depth, and a hull that it presses together. Compiled."""
+"""Water that is not the same at every depth, and a hull that it presses together. Compiled, and for a record."""
 
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sim.compiled import inner
-from sim.kernel.layout import COMPRESSIBILITY, LAYERS, LOADS, N_LAYERS
+from sim.kernel.layout import COMPRESSIBILITY, LAYERS, LOADS, N_LAYERS, Model
 
 
 @inner
@@ -29,3 +30,18 @@ def scale_by_depth(m: np.ndarray, w: np.ndarray, z: float, s: np.ndarray) -> flo
     for j in range(6):
         s[LOADS + j] *= ratio
     return ratio * (1.0 - m[COMPRESSIBILITY] * z)
+
+
+def shares_at(model: Model, z: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Shares of the loads and of the buoyancy at depths, as ``scale_by_depth`` takes them.
+
+    Parameters
+    ----------
+    z : (n,) depths of the body origin [m].
+    """
+    count = int(model.whole[N_LAYERS])
+    if not count:
+        return np.ones_like(z), np.ones_like(z)
+    depths, ratios = model.real[LAYERS : LAYERS + 2 * count].reshape(count, 2).T
+    ratio = np.interp(z, depths, ratios)
+    return ratio, ratio * (1.0 - model.compressibility * z)
