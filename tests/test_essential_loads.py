@@ -16,7 +16,7 @@ from small_campaign import write
 
 import ident
 from ident.cli import main
-from sim.files.errors import InputError
+from sim.flight.trim import NoEquilibrium
 
 BB2 = Path(__file__).parents[1] / "raw_captive_data" / "bb2"
 
@@ -37,7 +37,7 @@ def test_a_forgotten_column_of_a_campaign_stops_its_fit(tmp_path, column):
     assert not (tmp_path / "db").exists()
 
 
-def test_a_campaign_of_one_test_is_a_part_of_a_model_that_is_not_flown(tmp_path):
+def test_a_campaign_of_one_test_is_a_part_of_a_model_and_says_what_it_lacks(tmp_path):
     campaign = write(tmp_path / "drift")
     header = (campaign / "campaign.toml").read_text("utf-8")
     declared = '[absent]\n"drift_horizontal.N" = "a made balance of two components"\n'
@@ -45,5 +45,9 @@ def test_a_campaign_of_one_test_is_a_part_of_a_model_that_is_not_flown(tmp_path)
     (campaign / "campaign.toml").write_text(header.replace(declared, ""), "utf-8")
     (done,) = ident.fit(campaign, db=tmp_path / "db")
     assert [f.severity for f in done.findings if f.check == "essential"] == ["warning"]
-    with pytest.raises(InputError, match="every flight is wrong"):
+    rows = ident.Database(tmp_path / "db")[0].rows
+    of_hull = rows[(rows["part"] == "hull") & (rows["output"] == "N")]
+    assert (of_hull["estimated_by"] != "").all()
+    # No run gives a propeller.
+    with pytest.raises(NoEquilibrium):
         ident.validate("hzz20", tmp_path / "db")

@@ -25,6 +25,7 @@ _SLIPS = {
     "speeds in km/h taken for m/s": 3.6**-2,
     "angles in radians taken for degrees": math.radians(1.0) ** -1,
 }
+_SIGN = "a sign of the angles or of the loads"
 
 
 @check("lines")
@@ -56,7 +57,8 @@ def against_the_lines(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
     what = f"{named} what slender-body theory and a lattice make of the lines"
     slip = _slip(list(out.values()), rule.limits["apart"]) if len(out) > 1 else ""
     what += f"; {slip}?" if slip else ""
-    severity = "error" if slip else ""
+    # A sign may be the campaign's own; a unit is never.
+    severity = "error" if slip and slip != _SIGN else ""
     yield rule.finding(", ".join(sorted(files)), [], sorted({n[0] for n in out}), what, severity)
 
 
@@ -78,6 +80,6 @@ def beyond(value: float, known: Derivative, errors: float) -> float:
 def _slip(ratios: list[float], apart: float) -> str:
     """The slip that explains every ratio, each within ``apart`` of its factor."""
     if all(r < 0.0 for r in ratios):
-        return "a sign of the angles or of the loads"
+        return _SIGN
     found = [n for n, f in _SLIPS.items() if all(r > 0.0 and abs(math.log(r / f)) < math.log(apart) for r in ratios)]
     return found[0] if found else ""

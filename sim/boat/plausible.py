@@ -68,11 +68,11 @@ def check_mass(total: Any, added: Any, vehicle: Any) -> None:
     """
     given, where = vehicle.particulars, f"coefficients of vehicle {vehicle.name}, added mass"
     mass, arm = given.displaced_mass.value, given.length.value**2 / 12.0
-    sizes = np.diag(added) / (mass * np.array([1.0, 1.0, 1.0, arm, arm, arm]))
-    for motion, size, most in zip(_MOTIONS, sizes, _MOST_ADDED, strict=True):
-        if not _LEAST_ADDED <= size <= most:
-            of = "the displaced mass" + ("" if motion in _MOTIONS[:3] else " times length^2 / 12")
-            raise InputError(f"{where} in {motion}", f"{size:.3g} of {of}", f"zero to {most:g} of it")
+    units = mass * np.array([1.0, 1.0, 1.0, arm, arm, arm])
+    for motion, size, unit, most in zip(_MOTIONS, np.diag(added), units, _MOST_ADDED, strict=True):
+        if not _LEAST_ADDED * unit <= size <= most * unit:
+            of = f"the displaced mass of {mass:.4g} kg" + ("" if motion in _MOTIONS[:3] else " times length^2 / 12")
+            raise InputError(f"{where} in {motion}", f"{size:.3g}", f"zero to {most:g} of {of}")
     least = float(np.linalg.eigvalsh(0.5 * (total + total.T))[0]) if np.isfinite(total).all() else float("nan")
     if not least > 0.0:
         text = "a mass matrix that is not positive definite"
