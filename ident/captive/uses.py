@@ -48,6 +48,7 @@ class Uses:
         self._ignored |= other._ignored
         self._factors |= other._factors
         self._words |= other._words
+        self.beside |= other.beside
 
     def whole(self) -> None:
         """All factors are checked where the file is read."""
