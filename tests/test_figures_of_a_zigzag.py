@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import ident
-from ident.validation.figures import _draw, case_figure, pyplot
+from ident.validation.figures import _draw, case_figure
 
 SUBOFF = Path(__file__).parents[1] / "raw_captive_data" / "suboff"
 
@@ -21,7 +21,7 @@ def flown(tmp_path_factory):
 
 
 def test_planes_command_and_check_angles_are_drawn(flown):
-    figure, _ = _draw(flown, pyplot(), None)
+    figure, _ = _draw(flown, None)
     by_label = {axis.get_ylabel(): axis for axis in figure.axes}
     heading = next(axis for label, axis in by_label.items() if label.startswith("heading psi"))
     drawn = [line.get_ydata() for line in heading.lines]
@@ -33,7 +33,6 @@ def test_planes_command_and_check_angles_are_drawn(flown):
     assert list(planes) == wanted
     for name in wanted:
         np.testing.assert_array_equal(planes[name], np.degrees(flown.simulation[name]))
-    pyplot().close(figure)
 
 
 @pytest.mark.parametrize(("kind", "head"), [("png", b"\x89PNG"), ("svg", b"<?xml"), ("pdf", b"%PDF")])
