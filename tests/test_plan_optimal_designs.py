@@ -280,3 +280,11 @@ def test_a_facility_file_with_a_mistake(tmp_path, text, said):
 def test_a_target_that_is_no_target(rotations):
     with pytest.raises(InputError):
         make_plan(rotations, 0.0)
+
+
+def test_a_precision_that_rounding_made_singular_has_a_large_variance_where_nothing_is_told():
+    """Two unknowns of which only the sum is known, with precision 4."""
+    design = Design([np.zeros((1, 2))], np.array([[4.0, 4.0], [4.0, 4.0]]))
+    together, apart = np.array([1.0, 1.0]), np.array([1.0, -1.0])
+    assert together @ design.covariance @ together == pytest.approx(0.25, rel=1e-9)
+    assert apart @ design.covariance @ apart > 1e12

@@ -24,6 +24,18 @@ _HELPS = 1e-6
 _NEARLY = 1e-6
 
 
+def _inverse(information: Array) -> Array:
+    """Inverse of a precision; where rounding makes it singular, what nothing tells of has a very large variance."""
+    try:
+        return np.linalg.inv(information)
+    except np.linalg.LinAlgError:
+        size = np.sqrt(np.diag(information))
+        scale = 1.0 / np.where(size > 0.0, size, 1.0)
+        values, vectors = np.linalg.eigh(information * np.outer(scale, scale))
+        least = np.finfo(float).eps * len(values) * max(float(values[-1]), 1.0)
+        return (vectors / np.maximum(values, least)) @ vectors.T * np.outer(scale, scale)
+
+
 class Design:
     """Repeats of every candidate run, with the covariance they lead to.
 
@@ -46,7 +58,7 @@ class Design:
         """Covariance anew from the counts, free of the rounding of many updates."""
         used = np.flatnonzero(self.counts)
         information = self.prior + np.einsum("n,nkp,nkq->pq", self.counts[used], self.rows[used], self.rows[used])
-        self.covariance = np.linalg.inv(information)
+        self.covariance = _inverse(information)
         self.seen = self.rows @ self.covariance
 
     @property
