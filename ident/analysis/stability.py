@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ident.analysis.derivatives import loads, prime_scale, slope, steps
-from ident.analysis.state_space import StateSpaceModel, state_space
+from ident.analysis.state_space import StateSpaceModel, rate_change, state_space
 from ident.output import html_table
 from ident.text import on_screen
 from sim.boat.catalogue import OUTPUTS, STATES
@@ -25,9 +25,8 @@ from sim.files.errors import InputError
 from sim.flight.case import Case, load_case
 from sim.flight.simulate import environment_of, mixer_of, plane_limits
 from sim.flight.trim import NoEquilibrium, self_propulsion
-from sim.kernel import rhs as kernel
 from sim.kernel.assemble import assemble
-from sim.kernel.layout import Model, workspace
+from sim.kernel.layout import Model
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -250,21 +249,12 @@ def _linear(
     model: Model, vehicle: Vehicle, state: Array, controls: Array, kept: tuple[int, ...], step: float
 ) -> Linear:
     """Central differences of the right-hand side; ``step`` in a state, a degree in the command."""
-    work = workspace(model)
-
-    def change(to_state: Array, to_controls: Array) -> Array:
-        side = []
-        for sign in (1.0, -1.0):
-            rate = np.zeros(12)
-            kernel.rhs(model, state + sign * to_state, controls + sign * to_controls, work, rate)
-            side.append(rate)
-        return np.asarray(side[0] - side[1])[list(kept)] / 2.0
-
+    change = rate_change(model, state, controls)
     axis = "dV" if 2 in kept else "dH"
     shares = np.array([getattr(p.mixer, axis) for p in vehicle.planes] + [0.0])
     none = np.zeros_like(controls)
-    a = np.column_stack([change(step * np.eye(12)[j], none) / step for j in kept])
-    b = change(np.zeros(12), _DEFLECTION * shares) / _DEFLECTION
+    a = np.column_stack([change(step * np.eye(12)[j], none)[list(kept)] / step for j in kept])
+    b = change(np.zeros(12), _DEFLECTION * shares)[list(kept)] / _DEFLECTION
     about = [float(state[j]) for j in kept]
     return Linear(tuple(STATES[j] for j in kept), axis, a.tolist(), b.tolist(), about)
 

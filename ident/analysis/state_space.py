@@ -7,6 +7,7 @@ actuators, every plane, revolutions, ballast, and loads of waves or whatever els
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -123,8 +124,8 @@ def state_space(
     )
 
 
-def _slopes(model: Model, state: Array, controls: Array, planes: int) -> tuple[Array, Array]:
-    """Central differences of the right-hand side by states (12, 12) and by controls (12, k)."""
+def rate_change(model: Model, state: Array, controls: Array) -> Callable[[Array, Array], Array]:
+    """Half the change of all twelve rates between a step forth and a step back, of states and of controls."""
     work = workspace(model)
 
     def change(to_state: Array, to_controls: Array) -> Array:
@@ -135,6 +136,12 @@ def _slopes(model: Model, state: Array, controls: Array, planes: int) -> tuple[A
             side.append(rate)
         return np.asarray(side[0] - side[1]) / 2.0
 
+    return change
+
+
+def _slopes(model: Model, state: Array, controls: Array, planes: int) -> tuple[Array, Array]:
+    """Central differences of the right-hand side by states (12, 12) and by controls (12, k)."""
+    change = rate_change(model, state, controls)
     none, still = np.zeros(12), np.zeros_like(controls)
     a = np.column_stack([change(_STEP * one, still) / _STEP for one in np.eye(12)])
     sizes = np.full(controls.size, _DEFLECTION)

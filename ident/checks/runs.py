@@ -26,6 +26,7 @@ from ident.checks.findings import (
     prime,
     rules,
 )
+from ident.timeseries import MAD_TO_SIGMA
 from sim.boat.catalogue import MIRROR_OUTPUT, OUTPUTS
 
 # Axes along which a load is smooth; angles and rates also bend (stall), and do so in
@@ -39,8 +40,6 @@ _ODD = [o for o, sign in MIRROR_OUTPUT.items() if sign < 0]
 _NEAR, _BESIDE = 4, 16
 # Points worked on at once, and points of a series that are tried as the one that spoils it.
 _CHUNK, _SUSPECTS = 8192, 64
-# Normal consistency of the median absolute deviation.
-_MAD = 1.4826
 
 
 # -- symmetry ----------------------------------------------------------------------------
@@ -283,7 +282,7 @@ def deviations(evidence: Evidence, every: list[Series]) -> pd.DataFrame:
     alike = (raw.groupby(here).transform("size") >= 3) & table["axis"].isin(_BENDING)
     table["usual"] = table["load"].groupby(here).transform("median").where(alike, 0.0)
     table["off"] = raw - raw.groupby(here).transform("median").where(alike, 0.0)
-    robust = _MAD * table["off"].abs().groupby(kind).transform("median")
+    robust = MAD_TO_SIGMA * table["off"].abs().groupby(kind).transform("median")
     floor = rules()["outliers"].limits["floor"] * table["load"].abs().groupby(kind).transform("max")
     table["scale"] = np.maximum(np.maximum(robust, floor), _own_error(evidence, table))
     return table

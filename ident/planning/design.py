@@ -27,13 +27,13 @@ _NEARLY = 1e-6
 def _inverse(information: Array) -> Array:
     """Inverse of a precision; where rounding makes it singular, what nothing tells of has a very large variance."""
     try:
-        return np.linalg.inv(information)
+        return np.asarray(np.linalg.inv(information), dtype=np.float64)
     except np.linalg.LinAlgError:
         size = np.sqrt(np.diag(information))
         scale = 1.0 / np.where(size > 0.0, size, 1.0)
         values, vectors = np.linalg.eigh(information * np.outer(scale, scale))
         least = np.finfo(float).eps * len(values) * max(float(values[-1]), 1.0)
-        return (vectors / np.maximum(values, least)) @ vectors.T * np.outer(scale, scale)
+        return np.asarray((vectors / np.maximum(values, least)) @ vectors.T * np.outer(scale, scale), dtype=np.float64)
 
 
 class Design:

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ident.timeseries import MAD_TO_SIGMA
 from ident.timeseries.smoothing import Samples, SmoothPath, smooth
 from ident.trials.reading import Recording
 from sim.files.errors import InputError
@@ -103,7 +104,7 @@ def holds(record: Record) -> list[Hold]:
     """The stretches over which a control stays where it is, of three samples or more."""
     t, x = record.abscissa, record.value
     spread = float(np.percentile(x, 98) - np.percentile(x, 2))
-    tolerance = max(0.04 * spread, 4.0 * 1.4826 * float(np.median(np.abs(np.diff(x)))), math.radians(0.2))
+    tolerance = max(0.04 * spread, 4.0 * MAD_TO_SIGMA * float(np.median(np.abs(np.diff(x)))), math.radians(0.2))
     total = np.concatenate([[0.0], np.cumsum(x)])
     out: list[Hold] = []
     start = 0

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ident.checks.findings import Finding, spans
+from ident.timeseries import MAD_TO_SIGMA
 from ident.trials.reading import Recording
 
 Array = NDArray[np.float64]
@@ -33,7 +34,7 @@ def without_spikes(one: Recording) -> Recording:
         if len(record) < 9 or name in ("dH", "dV", "dH_order", "n"):
             continue
         away = np.abs(_away(record.value, name in _ANGLES))
-        usual = 1.4826 * float(np.median(away))
+        usual = MAD_TO_SIGMA * float(np.median(away))
         steps = np.abs(np.diff(record.value))
         if name in _ANGLES:
             steps = np.abs(np.angle(np.exp(1j * np.diff(record.value))))
