@@ -133,12 +133,15 @@ def _check_finite(rows: pd.DataFrame, where: str) -> None:
 
 
 def arrow(rows: pd.DataFrame) -> Any:
-    """Rows as an Arrow table with the types of the database."""
+    """Rows as an Arrow table with the types of the database, in one piece.
+
+    The storage engine writes the pieces of a table side by side, in whatever order they come.
+    """
     import pyarrow as pa
 
     kinds = {"double": pa.float64(), "int64": pa.int64(), "string": pa.string()}
     fields = [pa.field(c, kinds[column_type(c)]) for c in column_order()]
-    return pa.Table.from_pandas(rows[column_order()], schema=pa.schema(fields), preserve_index=False)
+    return pa.Table.from_pandas(rows[column_order()], schema=pa.schema(fields), preserve_index=False).combine_chunks()
 
 
 def commit(path: str, rows: pd.DataFrame, metadata: dict[str, str], wait: float = WAIT) -> tuple[int, bool]:
