@@ -13,7 +13,8 @@ from ident.database.store import database_rows
 from ident.estimates.appendages import differences, read_appendages
 from ident.identification.identify import identify
 from ident.validation.validate import Validation
-from sim.boat.vehicle import bundled, load_vehicle
+from sim.boat.vehicle import load_vehicle
+from sim.files.toml_files import bundled
 from sim.flight.case import load_case
 
 ROOT = Path(__file__).resolve().parents[1]

@@ -14,7 +14,8 @@ from ident.validation.draws import draw
 from sim.boat.coefficients import Coefficients
 from sim.boat.row_codec import correlation_matrix
 from sim.files.errors import InputError
-from sim.flight.case import Start, load_case
+from sim.flight.case import load_case
+from sim.flight.reference import Start
 from sim.flight.simulate import environment_of, simulate
 from sim.kernel.assemble import Assembly, assemble
 

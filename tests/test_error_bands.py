@@ -10,7 +10,8 @@ from ident.validation.draws import draw
 from sim.boat.coefficients import Coefficients
 from sim.boat.row_codec import correlation_matrix
 from sim.files.record import Record, Written
-from sim.flight.case import load_case, load_reference
+from sim.flight.case import load_case
+from sim.flight.series import load_reference
 from sim.flight.simulate import simulate
 
 

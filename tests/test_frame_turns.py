@@ -17,7 +17,8 @@ from ident.database.store import database_rows, digest
 from ident.identification.identify import identify
 from sim.boat.vehicle import load_vehicle
 from sim.files.frames import DIRECTIONS, Frame, FrameError
-from sim.flight.case import load_case, load_reference
+from sim.flight.case import load_case
+from sim.flight.series import load_reference
 
 SOURCE = Frame("aft", "starboard", "up")
 RIGHT_HANDED = [

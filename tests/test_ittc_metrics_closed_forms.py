@@ -7,7 +7,8 @@ import pytest
 
 from ident.metrics import turning, vertical
 from ident.metrics.measure import reference_channels
-from sim.flight.case import load_case, load_reference
+from sim.flight.case import load_case
+from sim.flight.series import load_reference
 
 # -- turns -------------------------------------------------------------------------------
 

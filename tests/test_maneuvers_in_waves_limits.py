@@ -7,7 +7,8 @@ import pytest
 from numba import njit
 
 from ident.metrics.in_waves import in_waves, irregular_waves, regular_waves, turn_drift
-from sim.flight.case import Case, WavesData, load_case
+from sim.flight.case import Case, load_case
+from sim.flight.environment import WavesData
 from sim.flight.simulate import model_of, simulate, water_of
 from sim.waves.in_waves import shares, surroundings, water_around
 from sim.waves.linear import kinematics, regular

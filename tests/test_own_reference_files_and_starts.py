@@ -17,7 +17,8 @@ from ident.validation.validate import validate
 from sim.boat.coefficients import Coefficients
 from sim.files.errors import InputError
 from sim.files.record import Record
-from sim.flight.case import load_case, load_reference
+from sim.flight.case import load_case
+from sim.flight.series import load_reference
 from sim.flight.simulate import simulate
 
 DATA = files("sim") / "cases" / "data"

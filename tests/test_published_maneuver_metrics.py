@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 from ident.metrics.zigzag import roll_decay, zigzag
-from sim.flight.case import load_case, load_reference
+from sim.flight.case import load_case
+from sim.flight.series import load_reference
 
 HZZ20 = {
     "EXP": {

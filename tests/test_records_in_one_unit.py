@@ -8,7 +8,7 @@ import pytest
 from ident.calibration.estimate import _channel
 from ident.calibration.file import Training
 from sim.files.record import Record, Written
-from sim.flight.case import Series
+from sim.flight.series import Series
 
 
 def test_degrees_become_radians_once_and_are_shown_as_written():

@@ -8,7 +8,8 @@ import pytest
 from ident.validation.bands import Bands, fly_samples, inside
 from ident.validation.reliability import mean_shares, metric_intervals, ranks, reliability, with_intervals
 from sim.files.record import Record
-from sim.flight.case import Series, load_case
+from sim.flight.case import load_case
+from sim.flight.series import Series
 
 
 def bands(samples, time, channel="psi", metrics=()):

@@ -16,9 +16,10 @@ from ident.cli import main
 from ident.validation.bands import fly_samples
 from sim.boat.coefficients import Coefficients
 from sim.boat.mass import Environment
-from sim.boat.vehicle import bundled, load_vehicle
+from sim.boat.vehicle import load_vehicle
 from sim.files.errors import InputError
 from sim.files.schema import Data, checked
+from sim.files.toml_files import bundled
 from sim.flight.case import load_case
 from sim.flight.plausible import check_revolutions, check_start
 from sim.flight.simulate import waves_of

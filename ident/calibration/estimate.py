@@ -30,8 +30,9 @@ from sim.boat.coefficients import Coefficients
 from sim.boat.vehicle import Vehicle, load_vehicle
 from sim.files.errors import InputError
 from sim.files.record import Record
-from sim.flight.case import Case, Series, load_case
+from sim.flight.case import Case, load_case
 from sim.flight.craft import Craft
+from sim.flight.series import Series
 from sim.flight.simulate import Simulation, equipped, fly
 from sim.flight.trim import NoEquilibrium
 

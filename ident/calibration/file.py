@@ -20,16 +20,16 @@ from pydantic import Field, model_validator
 
 from sim.boat import catalogue
 from sim.boat.database import axis_columns
-from sim.boat.vehicle import Vehicle, read_toml
+from sim.boat.vehicle import Vehicle
 from sim.files.errors import InputError
-from sim.files.schema import Data, checked
+from sim.files.schema import Data, Positive, checked
+from sim.files.toml_files import read_toml
 
 if TYPE_CHECKING:
     import pandas as pd
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
-Positive = Annotated[float, Field(gt=0)]
 # A multiplier further than this many captive standard errors from one needs another reason.
 ALLOWED = 2.0
 # What the column ``estimated_by`` says of an estimate that a prior would bring in once more.

@@ -10,9 +10,9 @@ from typing import Annotated, Literal
 
 from pydantic import Field, field_validator, model_validator
 
-from sim.boat.vehicle import read_toml
 from sim.files.errors import InputError
 from sim.files.schema import Data, FrameData, checked
+from sim.files.toml_files import read_toml
 
 # Metres in the unit that a surface is written in.
 UNITS = {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "in": 0.0254, "ft": 0.3048}

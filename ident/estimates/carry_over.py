@@ -20,8 +20,9 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from sim.boat.vehicle import Vehicle, read_toml
+from sim.boat.vehicle import Vehicle
 from sim.files.errors import InputError
+from sim.files.toml_files import read_toml
 from sim.hull.lattice import FINE, Fin, in_cylinder, in_wall, influence, lattice, normal_load
 from sim.hull.surface import Geometry, Hull
 

@@ -18,8 +18,9 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from sim.boat.vehicle import Vehicle, read_toml
+from sim.boat.vehicle import Vehicle
 from sim.files.errors import InputError
+from sim.files.toml_files import read_toml
 from sim.hull.surface import Geometry
 
 if TYPE_CHECKING:

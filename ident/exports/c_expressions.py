@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import ast
-import inspect
 import math
 import operator
-import textwrap
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any, Protocol
 
 import numpy as np
 
+from ident.exports.c_syntax import Function, calm_form, parsed, statements
 from ident.exports.c_types import (
     SCALARS,
     Block,
@@ -25,11 +24,9 @@ from ident.exports.c_types import (
     is_static,
     joined,
     loosened,
-    static_value,
 )
+from ident.exports.c_values import bare, c_name, chosen, flattened, handed, named
 from sim.kernel.rows import add_rows
-
-Function = Callable[..., Any]
 
 _OPERATIONS: dict[type[ast.operator], tuple[str, Callable[[Any, Any], Any]]] = {
     ast.Add: ("+", operator.add),
@@ -54,8 +51,6 @@ _MATH: dict[Any, str] = {
 # Arrays up to this long are handed over, longer ones known by name.
 _SHORT = 16
 _TYPES = {np.float64: "d", np.float32: "f", float: "d", int: "i"}
-# Words of C, and what every function is handed.
-_TAKEN = frozenset({"boat", "double", "float", "int", "char", "const", "long", "short", "signed", "static", "void"})
 
 
 class Translator(Protocol):
@@ -66,31 +61,6 @@ class Translator(Protocol):
 
     def helper(self, name: str, kind: str) -> str:
         """Name of a helper of C for a kind of number."""
-
-
-_parsed: dict[Function, ast.FunctionDef] = {}
-
-
-def parsed(function: Function) -> ast.FunctionDef:
-    """The syntax tree of a function."""
-    if function not in _parsed:
-        tree = ast.parse(textwrap.dedent(inspect.getsource(function))).body[0]
-        assert isinstance(tree, ast.FunctionDef)
-        _parsed[function] = tree
-    return _parsed[function]
-
-
-def statements(function: Function) -> list[ast.stmt]:
-    """Statements of a function without its docstring and ``pass``."""
-    kept = [s for s in parsed(function).body if not isinstance(s, ast.Pass)]
-    return [s for s in kept if not (isinstance(s, ast.Expr) and isinstance(s.value, ast.Constant))]
-
-
-def calm_form(function: Function, kinds: tuple[Kind, ...]) -> Function:
-    """The function that stands for another in deep, calm water, where surroundings are an empty tuple."""
-    if kinds and kinds[0] == Several(()):
-        return function.__globals__.get(f"_calm_{function.__name__}", function)
-    return function
 
 
 class Expressions:
@@ -115,10 +85,6 @@ class Expressions:
         line = getattr(node, "lineno", 0)
         return Untranslatable(f"{self.python.__module__}.{self.python.__name__}, line {line}: {text}")
 
-    def c_name(self, name: str) -> str:
-        """A name of Python as one of C."""
-        return f"{name}_" if name in _TAKEN else name
-
     def value(self, node: ast.expr) -> Value:
         """An expression.
 
@@ -141,7 +107,7 @@ class Expressions:
 
     def variable(self, name: str) -> Value:
         """A variable; a tuple is one variable an item."""
-        return _named(self.c_name(name), self.variables[name])
+        return named(c_name(name), self.variables[name])
 
     def _constant(self, node: ast.Constant) -> Value:
         return constant(node.value)
@@ -191,7 +157,7 @@ class Expressions:
         if rest:
             place = self.times(place, math.prod(rest))
             return Value(f"({owner.text} + {place.text})", Block(owner.kind.kind, rest, None, owner.kind.fixed))
-        return Value(f"{owner.text}[{_bare(place.text)}]", Number(owner.kind.kind))
+        return Value(f"{owner.text}[{bare(place.text)}]", Number(owner.kind.kind))
 
     def _item(self, node: ast.AST, owner: Value, index: Value) -> Value:
         assert isinstance(index.kind, Number)
@@ -306,7 +272,7 @@ class Expressions:
         if test.kind.value is not None:
             return self.value(node.body if test.kind.value else node.orelse)
         before = len(self.before)
-        found = _chosen(test.text, self.value(node.body), self.value(node.orelse))
+        found = chosen(test.text, self.value(node.body), self.value(node.orelse))
         if len(self.before) != before:
             raise self.fail(node, "a call that gives a tuple, where it may not be made")
         return found
@@ -326,16 +292,16 @@ class Expressions:
             return constant(len(arguments[0].parts))
         if target is abs:
             whole = isinstance(arguments[0].kind, Number) and arguments[0].kind.kind == "i"
-            return Value(f"{'abs' if whole else 'fabs'}({_bare(arguments[0].text)})", loosened(arguments[0].kind))
+            return Value(f"{'abs' if whole else 'fabs'}({bare(arguments[0].text)})", loosened(arguments[0].kind))
         if target is np.sign:
             name = self.translation.helper("sign", "d")
-            return Value(f"{name}({_bare(arguments[0].text)})", Number("d"))
+            return Value(f"{name}({bare(arguments[0].text)})", Number("d"))
         if target in _TYPES:
             kind = _TYPES[target]
             return Value(f"(({SCALARS[kind]}){arguments[0].text})", Number(kind))
         if target in _MATH:
             single = all(isinstance(a.kind, Number) and a.kind.kind == "f" for a in arguments)
-            texts = ", ".join(_bare(a.text) for a in arguments)
+            texts = ", ".join(bare(a.text) for a in arguments)
             return Value(f"{_MATH[target]}{'f' if single else ''}({texts})", Number("f" if single else "d"))
         if not callable(target) or not hasattr(getattr(target, "py_func", target), "__code__"):
             raise self.fail(node, f"a call of {ast.unparse(node.func)}")
@@ -358,7 +324,7 @@ class Expressions:
             kind = joined(loosened(found.kind), loosened(other.kind))
             assert isinstance(kind, Number)
             name = self.translation.helper("least" if target is min else "largest", kind.kind)
-            found = Value(f"{name}({_bare(found.text)}, {_bare(other.text)})", kind)
+            found = Value(f"{name}({bare(found.text)}, {bare(other.text)})", kind)
         return found
 
     def _reshaped(self, node: ast.Call) -> Value:
@@ -378,7 +344,7 @@ class Expressions:
             *(f"{out.text} + {at.text}", table.text, *(r.text for r in rows.parts)),
             *(*(w.text for w in weights.parts), f"{products.text} + {first.text}", f"{places.text} + {place.text}"),
         )
-        return Value(f"{name}({', '.join(_bare(g) for g in given)})", Several(()))
+        return Value(f"{name}({', '.join(bare(g) for g in given)})", Several(()))
 
     def called(self, node: ast.AST, function: Function, arguments: list[Value]) -> Value:
         """A call of another compiled function."""
@@ -400,7 +366,7 @@ class Expressions:
         if isinstance(returned, Number):
             return Value(f"{name}({', '.join(['boat', *texts])})", returned)
         self.temporaries += 1
-        result = _named(f"got{self.temporaries}", returned)
+        result = named(f"got{self.temporaries}", returned)
         self.variables[f"got{self.temporaries}"] = returned
         leaves = [v for v in flattened(result) if not is_static(v.kind)]
         self.before.append(f"{name}({', '.join(['boat', *texts, *(f'&{v.text}' for v in leaves)])});")
@@ -415,57 +381,3 @@ class Expressions:
         if isinstance(kind, Block) and (kind.member in self.arrays or kind.size <= _SHORT):
             return replace(kind, member=None)
         return kind
-
-
-def flattened(value: Value) -> list[Value]:
-    """The numbers and arrays of a value."""
-    if isinstance(value.kind, Several):
-        return [leaf for part in value.parts for leaf in flattened(part)]
-    return [value]
-
-
-def handed(value: Value, kind: Kind) -> list[str]:
-    """Texts of the arguments that C needs for a value of a type."""
-    if is_static(kind):
-        return []
-    if isinstance(kind, Several):
-        return [t for part, one in zip(value.parts, kind.items, strict=True) for t in handed(part, one)]
-    return [_bare(value.text)]
-
-
-def _named(name: str, kind: Kind) -> Value:
-    if is_static(kind):
-        return static_value(kind)
-    if isinstance(kind, Several):
-        return Value("", kind, tuple(_named(f"{name}_{i}", one) for i, one in enumerate(kind.items)))
-    return Value(name, kind)
-
-
-def named(name: str, kind: Kind) -> Value:
-    """A variable or argument of a type, a tuple as one an item."""
-    return _named(name, kind)
-
-
-def _chosen(test: str, first: Value, second: Value) -> Value:
-    if isinstance(first.kind, Several):
-        parts = tuple(_chosen(test, a, b) for a, b in zip(first.parts, second.parts, strict=True))
-        return Value("", Several(tuple(p.kind for p in parts)), parts)
-    kind = joined(loosened(first.kind), loosened(second.kind))
-    return Value(f"({test} ? {first.text} : {second.text})", kind)
-
-
-def _bare(text: str) -> str:
-    """An expression without the brackets around the whole of it."""
-    if not (text.startswith("(") and text.endswith(")")):
-        return text
-    depth = 0
-    for place, letter in enumerate(text):
-        depth += (letter == "(") - (letter == ")")
-        if depth == 0 and place < len(text) - 1:
-            return text
-    return text[1:-1]
-
-
-def bare(text: str) -> str:
-    """An expression as it stands on its own."""
-    return _bare(text)

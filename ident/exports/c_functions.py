@@ -10,8 +10,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from ident.exports.c_expressions import Function
 from ident.exports.c_statements import Body
+from ident.exports.c_syntax import Function
 from ident.exports.c_types import SCALARS, Kind
 
 

@@ -8,8 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from ident.exports.c_expressions import Expressions, Function, Translator, bare, flattened, named, parsed, statements
+from ident.exports.c_expressions import Expressions, Translator
+from ident.exports.c_syntax import Function, parsed, statements
 from ident.exports.c_types import SCALARS, Block, Kind, Number, Several, Value, is_static, joined, loosened
+from ident.exports.c_values import bare, c_name, flattened, named
 
 _INDENT = "    "
 # Types settle in a few readings of a function.
@@ -33,7 +35,7 @@ class Body(Expressions):
         """Read the function until the types of its variables no longer change."""
         for _ in range(_READINGS):
             known = dict(self.variables), self.returned
-            self.bound = {n: named(self.c_name(n), k) for n, k in self.arguments.items() if n not in self.stores}
+            self.bound = {n: named(c_name(n), k) for n, k in self.arguments.items() if n not in self.stores}
             for name, kind in self.arguments.items():
                 if name in self.stores:
                     self.variables[name] = joined(self.variables.get(name), loosened(kind))
@@ -50,7 +52,7 @@ class Body(Expressions):
         given = [f"{holder} *boat"]
         unused = ["boat"] if not any("boat" in line for line in self.lines) else []
         for argument, kind in self.arguments.items():
-            leaves = [v for v in flattened(named(self.c_name(argument), kind)) if not is_static(v.kind)]
+            leaves = [v for v in flattened(named(c_name(argument), kind)) if not is_static(v.kind)]
             given += [_declared(v) for v in leaves]
             unused += [v.text for v in leaves if not _appears(v.text, self.lines)]
         head = "void"
@@ -62,7 +64,7 @@ class Body(Expressions):
             leaf
             for variable, kind in self.variables.items()
             if variable not in self.arguments
-            for leaf in flattened(named(self.c_name(variable), kind))
+            for leaf in flattened(named(c_name(variable), kind))
             if not is_static(leaf.kind) and _appears(leaf.text, self.lines)
         ]
         lines = [f"{_INDENT}{_declared(v)} = 0;" for v in own]
@@ -135,7 +137,7 @@ class Body(Expressions):
         sizes = tuple(v.kind.value for v in flattened(shape) if isinstance(v.kind, Number))
         if not isinstance(target, ast.Name) or self.stores[target.id] != 1 or None in sizes:
             raise self.fail(node, "an array whose size is not known, or whose name stands for others too")
-        name = self.c_name(target.id)
+        name = c_name(target.id)
         kind = self.arrays[name] = Block("d", sizes, name)
         if self._called(node) is np.zeros:
             self._say(f"memset({name}, 0, sizeof {name});")
@@ -260,7 +262,7 @@ class Body(Expressions):
             raise self.fail(node, "a step other than one")
         if _outlives(node, node.target.id, parsed(self.python)):
             raise self.fail(node, "a counter that is used after its loop, or changed in it")
-        name = self.c_name(node.target.id)
+        name = c_name(node.target.id)
         kept = dict(self.bound)
         self.bound[node.target.id] = Value(name, Number("i"))
         sign, change = ("<", "++") if step == 1 else (">", "--")

@@ -13,7 +13,8 @@ from ident.metrics import in_waves as sea_cases
 from ident.metrics import turning, vertical
 from ident.metrics.in_waves import InWaves
 from ident.metrics.zigzag import roll_decay, zigzag
-from sim.flight.case import Case, Series
+from sim.flight.case import Case
+from sim.flight.series import Series
 from sim.flight.simulate import Simulation
 
 Array = NDArray[np.float64]

@@ -17,9 +17,9 @@ from pydantic import Field, field_validator
 from ident.captive.campaign import Campaign
 from ident.captive.run_table import STATES, run_table
 from sim.boat.parts import parts_of, vehicle_terms
-from sim.boat.vehicle import read_toml
 from sim.files.errors import InputError
 from sim.files.schema import Data, checked
+from sim.files.toml_files import read_toml
 
 RATES = ("p", "q", "r")
 # Propeller curves are not a matter of design: a row of advance coefficients gives them.

@@ -28,9 +28,10 @@ from sim.boat.coefficients import Coefficients
 from sim.boat.database import Version, axis_columns, own_version, read_rows
 from sim.boat.mass import Environment
 from sim.boat.parts import parts_of, vehicle_terms
-from sim.boat.vehicle import Vehicle, bundled, load_vehicle
+from sim.boat.vehicle import Vehicle, load_vehicle
 from sim.files.errors import InputError
 from sim.files.frames import PROGRAM
+from sim.files.toml_files import bundled
 
 # Prime derivatives do not depend on density and gravity, so both may be anything.
 _UNIT = Environment(density=1.0, gravity=0.0)

@@ -9,8 +9,8 @@ from pydantic import Field, field_validator, model_validator
 
 from ident.captive.patterns import compiled
 from ident.captive.source import Encoding
-from sim.boat.vehicle import read_toml
 from sim.files.schema import Data, FrameData, checked
+from sim.files.toml_files import read_toml
 
 Positive = Annotated[float, Field(gt=0, le=1e9)]
 Axis = Literal["north", "east", "south", "west"]

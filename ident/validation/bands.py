@@ -24,8 +24,9 @@ from sim.boat.coefficients import Coefficients
 from sim.boat.row_codec import correlation_matrix
 from sim.boat.vehicle import Vehicle
 from sim.files.errors import InputError
-from sim.flight.case import Case, Series
+from sim.flight.case import Case
 from sim.flight.craft import Craft
+from sim.flight.series import Series
 from sim.flight.simulate import DERIVED, columns_of, equipped, fly, samples_of, uses_tanks
 from sim.flight.trim import NoEquilibrium
 from sim.kernel.assemble import Assembly

@@ -13,8 +13,9 @@ from typing import Any
 
 import numpy as np
 
-from sim.boat.vehicle import Vehicle, bundled, load_vehicle
+from sim.boat.vehicle import Vehicle, load_vehicle
 from sim.files.errors import InputError
+from sim.files.toml_files import bundled
 from sim.flight.case import Case
 from sim.flight.commands import Commands, Event
 from sim.flight.simulate import Simulation, mixer_of

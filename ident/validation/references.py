@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.files.errors import InputError
-from sim.flight.case import Case, Series
+from sim.flight.case import Case
+from sim.flight.series import Series
 from sim.flight.simulate import CHANNELS, Simulation
 
 Array = NDArray[np.float64]

@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 
 from ident.metrics.measure import Columns
 from ident.validation.bands import LEVELS, Bands
-from sim.flight.case import Case, Series
+from sim.flight.case import Case
+from sim.flight.series import Series
 
 if TYPE_CHECKING:
     from rich.console import Console

@@ -18,7 +18,8 @@ if TYPE_CHECKING:
     from ident.metrics.in_waves import InWaves
     from ident.validation.bands import Bands
     from ident.validation.boats import Boat
-    from sim.flight.case import Case, Series
+    from sim.flight.case import Case
+    from sim.flight.series import Series
     from sim.flight.simulate import Simulation
 
 

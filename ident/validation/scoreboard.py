@@ -16,8 +16,9 @@ from ident.validation.result import ChannelError, Validation
 from ident.validation.validate import errors, flights, validate
 from sim.boat.catalogue import CatalogueError
 from sim.boat.database import version_words
-from sim.boat.vehicle import Vehicle, bundled, load_vehicle
+from sim.boat.vehicle import Vehicle, load_vehicle
 from sim.files.errors import InputError
+from sim.files.toml_files import bundled
 from sim.flight.case import load_case
 from sim.flight.trim import NoEquilibrium
 

@@ -19,13 +19,15 @@ from ident.timeseries.smoothing import Samples, SmoothPath, smooth
 from ident.trials.channels import plain
 from ident.trials.spec import TrialFile, load_spec
 from ident.trials.trial import Trial, measure_trial, side_of
-from sim.boat.vehicle import bundled
 from sim.files.errors import InputError
 from sim.files.record import Record, Written
 from sim.files.schema import FrameData
-from sim.flight.case import Case, Reference, Series, Start, load_reference
+from sim.files.toml_files import bundled
+from sim.flight.case import Case
 from sim.flight.commands import Event, PlaneCommand, PlaneStep, SpeedCommand, SpeedStep
+from sim.flight.reference import Reference, Start
 from sim.flight.reference_table import is_series
+from sim.flight.series import Series, load_reference
 from sim.flight.simulate import CHANNELS
 
 Array = NDArray[np.float64]

@@ -25,8 +25,10 @@ from sim.boat.vehicle import Vehicle, load_vehicle
 from sim.files.errors import InputError
 from sim.files.record import Record
 from sim.files.schema import FrameData
-from sim.flight.case import Case, Reference, Series, load_case, read_series
+from sim.flight.case import Case, load_case
+from sim.flight.reference import Reference
 from sim.flight.reference_table import is_series
+from sim.flight.series import Series, read_series
 from sim.flight.simulate import CHANNELS, Simulation, fly
 
 if TYPE_CHECKING:

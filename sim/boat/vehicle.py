@@ -2,86 +2,19 @@
 
 from __future__ import annotations
 
-import tomllib
 from importlib.resources import files
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import AfterValidator, Field, field_validator
+from pydantic import Field, field_validator
 
 from sim.boat.plausible import check_vehicle
-from sim.files import inputs
+from sim.boat.stated import Length, Limits, Mass, Number, Place, Vector, in_unit
 from sim.files.errors import InputError
 from sim.files.frames import PROGRAM, Frame
 from sim.files.schema import Data, FrameData, Name, checked
-
-Vector = Annotated[list[float], Field(min_length=3, max_length=3)]
-
-
-class Number(Data):
-    """A number with its unit and where it comes from.
-
-    Attributes
-    ----------
-    value : The number, in the unit.
-    unit : Its unit; only the one that the key asks for is taken.
-    source : Where it comes from.
-    """
-
-    value: float
-    unit: str
-    source: str
-
-
-class Triple(Data):
-    """A vector with its unit and where it comes from.
-
-    Attributes
-    ----------
-    value : Three numbers along the axes of the file, in the unit.
-    unit : Their unit.
-    source : Where they come from.
-    """
-
-    value: Vector
-    unit: str
-    source: str
-
-
-class Limits(Data):
-    """A lower and an upper limit with unit and source.
-
-    Attributes
-    ----------
-    value : The lower and the upper limit, in the unit.
-    unit : Their unit.
-    source : Where they come from.
-    """
-
-    value: Annotated[list[float], Field(min_length=2, max_length=2)]
-    unit: str
-    source: str
-
-
-def _stated(unit: str, positive: bool = False) -> AfterValidator:
-    """Numbers are taken as they are: what states another unit, or a size that is none, is refused."""
-
-    def check(given: Number | Triple | Limits) -> Number | Triple | Limits:
-        if given.unit != unit:
-            raise ValueError(f"unit {unit!r}, and the value in it")
-        if positive and isinstance(given, Number) and not given.value > 0.0:
-            raise ValueError("a value above zero")
-        if isinstance(given, Limits) and not given.value[0] < given.value[1]:
-            raise ValueError("the lower limit, then the upper one")
-        return given
-
-    return AfterValidator(check)
-
-
-Length = Annotated[Number, _stated("m", positive=True)]
-Mass = Annotated[Number, _stated("kg", positive=True)]
-Place = Annotated[Triple, _stated("m")]
+from sim.files.toml_files import read_toml
 
 
 class Particulars(Data):
@@ -122,8 +55,8 @@ class Propeller(Data):
 
     name: str
     diameter: Length
-    limits: Annotated[Limits, _stated("rps")]
-    rate: Annotated[Number, _stated("rps/s", positive=True)]
+    limits: Annotated[Limits, in_unit("rps")]
+    rate: Annotated[Number, in_unit("rps/s", positive=True)]
     position: Place | None = None
 
 
@@ -136,7 +69,7 @@ class Rudder(Data):
     height : H_R, its span [m].
     """
 
-    area: Annotated[Number, _stated("m2", positive=True)]
+    area: Annotated[Number, in_unit("m2", positive=True)]
     height: Length
 
 
@@ -226,7 +159,7 @@ class BallastTank(Data):
 
     position: Place
     limit: Mass
-    rate: Annotated[Number, _stated("kg/s", positive=True)]
+    rate: Annotated[Number, in_unit("kg/s", positive=True)]
 
 
 class TrimTank(Data):
@@ -239,7 +172,7 @@ class TrimTank(Data):
     """
 
     limit: Length
-    rate: Annotated[Number, _stated("m/s", positive=True)]
+    rate: Annotated[Number, in_unit("m/s", positive=True)]
 
 
 class Tanks(Data):
@@ -384,46 +317,6 @@ class Vehicle(Data):
             where = f"vehicle {self.name}, key particulars.sail_top"
             raise InputError(where, "nothing", f"the highest point of boat or sail: {what} needs it")
         return top.value
-
-
-def bundled(kind: str) -> list[str]:
-    """Names of the bundled ``vehicles`` or ``cases``."""
-    return sorted(p.name[:-5] for p in (files("sim") / kind).iterdir() if p.name.endswith(".toml"))
-
-
-def read_toml(name: str | Path, kind: str, named_in: str = "") -> tuple[dict[str, Any], str]:
-    """A bundled name or a path to a TOML file, as data and the name to report.
-
-    Parameters
-    ----------
-    name : The name or path.
-    kind : ``vehicles`` or ``cases``; empty where none are bundled.
-    named_in : File and key that name it, for the message.
-
-    Raises
-    ------
-    InputError
-        When neither a bundled file nor a readable TOML file of that name exists.
-    """
-    path = Path(name)
-    if kind and path.suffix != ".toml" and str(name) in bundled(kind):
-        return tomllib.loads((files("sim") / kind / f"{name}.toml").read_text("utf-8")), str(name)
-    try:
-        there = path.is_file()
-    except OSError:
-        there = False
-    if not there:
-        found, text = "no such file", "a path to a .toml file"
-        if kind:
-            found, text = "no such file or bundled name", f"one of {', '.join(bundled(kind))}, or a path"
-        if named_in:
-            raise InputError(named_in, f"{str(name)[:200]!r}: {found}", text)
-        raise InputError(str(name)[:200], found, text)
-    raw = inputs.statements(path)
-    try:
-        return tomllib.loads(raw.decode("utf-8")), str(path)
-    except (ValueError, RecursionError) as error:
-        raise InputError(str(path), f"not TOML: {error}", "a TOML file in UTF-8") from error
 
 
 def load_vehicle(name: str | Path, beside: str | Path = "") -> Vehicle:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any, TypeVar
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, ValidationError
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 
 from sim.files.errors import InputError, explain
 from sim.files.frames import Frame, FrameError
@@ -27,6 +27,7 @@ def _named(name: str) -> str:
     return name
 
 
+Positive = Annotated[float, Field(gt=0)]
 _LONGEST_NAME = 100
 # Cases and vehicles give files their names.
 Name = Annotated[str, AfterValidator(_named)]

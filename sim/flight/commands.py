@@ -9,11 +9,10 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from sim.boat.catalogue import STATES
-from sim.files.schema import Data
+from sim.files.schema import Data, Positive
 from sim.flight import orders
 from sim.flight.orders import Programme
 
-Positive = Annotated[float, Field(gt=0)]
 _ANGLES, _RATES = ("phi", "theta", "psi"), ("p", "q", "r")
 _WATCHED = (*STATES, "U", "point_depth")
 _LAWS = {"fixed": orders.FIXED, "pid": orders.PID, "zigzag": orders.ZIGZAG, "programme": orders.PROGRAMME}

@@ -16,8 +16,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.boat.vehicle import Vehicle, read_toml
+from sim.boat.vehicle import Vehicle
 from sim.files.errors import InputError
+from sim.files.toml_files import read_toml
 from sim.hull.surface import Geometry, Hull
 
 Array = NDArray[np.float64]

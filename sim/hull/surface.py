@@ -14,9 +14,10 @@ import numpy as np
 import pandas as pd
 from pydantic import Field
 
-from sim.boat.vehicle import Place, read_toml
+from sim.boat.stated import Place
 from sim.files.errors import InputError
 from sim.files.schema import Data, FrameData, checked
+from sim.files.toml_files import read_toml
 from sim.hull.mesh import Array, Index, Mesh, MeshError, closed_part, joined
 
 _FOIL_COLUMNS = [
