@@ -49,7 +49,8 @@ def sigma(measured: str) -> str:
 def excluded(runs: pd.DataFrame, measured: str) -> pd.Series:
     """True for runs whose column ``exclude`` names a load or coefficient."""
     texts = runs["exclude"]
-    return texts.map({text: measured in text.split() for text in texts.unique()}).astype(bool)
+    named = {text: measured in text.split() for text in texts.unique()}
+    return texts.map(named).astype(bool) if any(named.values()) else pd.Series(False, index=runs.index)
 
 
 def run_table(columns: Mapping[str, Any]) -> pd.DataFrame:

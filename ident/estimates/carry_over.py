@@ -24,7 +24,7 @@ from sim.boat.vehicle import Vehicle
 from sim.files.errors import InputError
 from sim.files.toml_files import read_toml
 from sim.hull.lattice import FINE, Fin, in_cylinder, in_wall, influence, lattice, normal_load
-from sim.hull.surface import Geometry, Hull
+from sim.hull.surface import Geometry, Hull, hull_of
 
 Array = NDArray[np.float64]
 
@@ -125,7 +125,7 @@ def _parts(vehicle: Vehicle) -> tuple[pd.DataFrame, Hull, pd.DataFrame]:
         raise InputError(where, f"parts {', '.join(sorted(parts))}", "hull, sail and foils")
     folder = Path(where).parent
     foils = pd.read_csv(folder / parts["foils"].offsets).set_index("name")
-    return foils, Hull(folder / parts["hull"].offsets), pd.read_csv(folder / parts["sail"].offsets)
+    return foils, hull_of(folder / parts["hull"].offsets), pd.read_csv(folder / parts["sail"].offsets)
 
 
 def _stern_fins(foils: pd.DataFrame, gap: float, radius: float) -> list[Fin]:

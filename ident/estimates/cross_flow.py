@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from sim.boat.vehicle import Vehicle
 from sim.files.errors import InputError
 from sim.files.toml_files import read_toml
-from sim.hull.surface import Geometry, Hull
+from sim.hull.surface import Geometry, hull_of
 
 Array = NDArray[np.float64]
 
@@ -76,7 +76,7 @@ def strips(vehicle: Vehicle, vertical: bool = False) -> Strips:
     part = next((p for p in geometry.parts if p.kind == "hull"), None)
     if part is None:
         raise InputError(where, "no hull", "a part of kind hull")
-    hull = Hull(Path(where).parent / part.offsets)
+    hull = hull_of(Path(where).parent / part.offsets)
     edges = np.linspace(hull.x[0], hull.x[-1], _SECTIONS + 1)
     middle = 0.5 * (edges[1:] + edges[:-1])
 

@@ -40,38 +40,54 @@ class Draft:
     Attributes
     ----------
     vehicle : Whose rows.
-    rows : As the runs gave them, then the rows that estimates added, in this order.
     value : (n,) values as they stand.
     scale : (n,) what is left of each captive standard error.
     words : For each row, the estimates in force and what they did.
     directions : Unknown of an estimate -> (n,) change of the values by one standard deviation of it.
+    names, parts : Coefficient and part of each row: as the runs gave them, then what estimates added.
     memo : What more than one estimate computes from the vehicle.
     """
 
     vehicle: Vehicle
-    rows: pd.DataFrame
     value: Array
     scale: Array
     words: list[list[str]]
     directions: dict[str, Array]
+    names: list[str]
+    parts: list[str]
+    _joined: pd.DataFrame
+    _numbers: int
+    _added: list[dict[str, object]] = field(default_factory=list)
     memo: dict[str, object] = field(default_factory=dict)
 
     @classmethod
     def of(cls, vehicle: Vehicle, rows: pd.DataFrame) -> Draft:
         """A draft of rows that no estimate has touched."""
-        own = rows.reset_index(drop=True)
-        n = len(own)
-        return cls(vehicle, own, own["value"].to_numpy(float).copy(), np.ones(n), [[] for _ in range(n)], {})
+        first = rows.reset_index(drop=True)
+        n = len(first)
+        names, parts = first["coefficient"].tolist(), first["part"].tolist()
+        value = first["value"].to_numpy(float).copy()
+        numbers = int(first["estimate"].max()) + 1 if n else 0
+        return cls(vehicle, value, np.ones(n), [[] for _ in range(n)], {}, names, parts, first, numbers)
+
+    @property
+    def rows(self) -> pd.DataFrame:
+        """The rows; those added since they were last asked for are joined to them at once."""
+        if self._added:
+            table = pd.DataFrame(self._added).reindex(columns=self._joined.columns)
+            table = table.astype({c: t for c, t in self._joined.dtypes.items() if t.kind in "fi"})
+            self._joined, self._added = pd.concat([self._joined, table], ignore_index=True), []
+        return self._joined
 
     # -- which rows -------------------------------------------------------------------------
 
     def where(self, terms: Sequence[str], parts: Sequence[str] = ("*",)) -> Mask:
         """(n,) True where coefficient and part match any of the shell patterns."""
-        return _matching(self.rows["coefficient"], terms) & _matching(self.rows["part"], parts)
+        return _matching(self.names, terms) & _matching(self.parts, parts)
 
     def has(self, *terms: str) -> bool:
         """Whether any of the coefficients has a row."""
-        return bool(self.rows["coefficient"].isin(terms).any())
+        return not set(terms).isdisjoint(self.names)
 
     def axis(self, name: str) -> Array:
         """(n,) values along an axis as the database holds them (deg or SI); NaN where a row has none."""
@@ -131,8 +147,8 @@ class Draft:
             raise NotApplicable(f"the term set of {self.vehicle.name} has no {term}")
         known = row_of[term]
         columns = {axis: column for column, axis in axis_columns().items()}
-        first = int(self.rows["estimate"].max()) + 1 if len(self.rows) else 0
-        new = []
+        first = self._numbers
+        new: list[dict[str, object]] = []
         for i, (point, value) in enumerate(zip(points, values, strict=True)):
             place = {columns[a]: to_column(columns[a], point[a]) for a in known.axes}
             new.append(
@@ -147,9 +163,10 @@ class Draft:
                 }
             )
         count = len(new)
-        table = pd.DataFrame(new).reindex(columns=self.rows.columns)
-        table = table.astype({c: t for c, t in self.rows.dtypes.items() if t.kind in "fi"})
-        self.rows = pd.concat([self.rows, table], ignore_index=True)
+        self._added += new
+        self._numbers += count
+        self.names += [term] * count
+        self.parts += [known.part] * count
         self.value = np.concatenate([self.value, np.asarray(values, dtype=float)])
         self.scale = np.concatenate([self.scale, np.zeros(count)])
         self.words += [[word] for _ in range(count)]
@@ -185,10 +202,10 @@ class Draft:
         return with_covariance(out, list(first["estimate"]), total)
 
 
-def _matching(column: pd.Series, patterns: Sequence[str]) -> Mask:
+def _matching(names: Sequence[str], patterns: Sequence[str]) -> Mask:
     """(n,) True where a name matches any of the shell patterns; each name is looked at once."""
-    number, names = pd.factorize(column)
-    return np.array([any(fnmatchcase(str(n), p) for p in patterns) for n in names], dtype=bool)[number]
+    fits = {n: any(fnmatchcase(n, p) for p in patterns) for n in set(names)}
+    return np.array([fits[n] for n in names], dtype=bool)
 
 
 def with_covariance(rows: pd.DataFrame, numbers: Sequence[int], total: Array) -> pd.DataFrame:

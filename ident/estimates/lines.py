@@ -89,9 +89,15 @@ def _add(draft: Draft, name: str, points: list[dict[str, float]], value: Array, 
 
 def _at(draft: Draft, axis: str) -> float:
     """Where along an axis an estimate stands that does not depend on it: the deepest, the fastest, else zero."""
-    known = draft.axis(axis) if axis in ("D0", "U") else np.zeros(0)
-    known = known[np.isfinite(known)]
-    return float(known.max()) if known.size else 0.0
+    if axis not in ("D0", "U"):
+        return 0.0
+    # What stands there once is not moved by the rows that are put there.
+    if (place := draft.memo.get(f"lines at {axis}")) is None:
+        known = draft.axis(axis)
+        known = known[np.isfinite(known)]
+        place = draft.memo[f"lines at {axis}"] = float(known.max()) if known.size else 0.0
+    assert isinstance(place, float)
+    return place
 
 
 def _add_over_angles(draft: Draft, name: str, one: Derivative) -> None:

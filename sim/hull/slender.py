@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from sim.boat.vehicle import Vehicle
 from sim.files.errors import InputError
 from sim.files.toml_files import read_toml
-from sim.hull.surface import Geometry, Hull
+from sim.hull.surface import Geometry, hull_of
 
 Array = NDArray[np.float64]
 
@@ -92,7 +92,7 @@ def lines(vehicle: Vehicle) -> Lines:
     part = next((p for p in geometry.parts if p.kind == "hull"), None)
     if part is None:
         raise InputError(str(vehicle.geometry), "no hull", "a part of kind hull")
-    hull = Hull(folder / part.offsets)
+    hull = hull_of(folder / part.offsets)
     # Closer where the sections change, at the ends.
     x = hull.x[0] + (hull.x[-1] - hull.x[0]) * 0.5 * (1.0 - np.cos(np.linspace(0.0, np.pi, _SECTIONS + 1)))
     angle = np.linspace(0.0, np.pi, 91)

@@ -7,6 +7,7 @@ deck), ``foils`` (planes and roots by their corners). A boat may have a hull alo
 
 from __future__ import annotations
 
+from functools import lru_cache
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -97,6 +98,19 @@ def _table(path: Path, columns: list[str]) -> pd.DataFrame:
             raise InputError(place, repr(table[column].iloc[bad[0]]), "a finite number")
         table[column] = numbers
     return table
+
+
+@lru_cache(maxsize=8)
+def _same_hull(path: Path, changed: int, size: int) -> Hull:
+    return Hull(path)
+
+
+def hull_of(path: Path) -> Hull:
+    """The hull of a table of offsets, read once as long as the file is the same. Raises as ``Hull``."""
+    if not path.is_file():
+        return Hull(path)
+    state = path.stat()
+    return _same_hull(path, state.st_mtime_ns, state.st_size)
 
 
 class Hull:
