@@ -18,6 +18,7 @@ ROOT = Path(__file__).resolve().parents[1]
 # The documentation is of this checkout, whatever copy of the package is installed.
 sys.path[:0] = [str(ROOT), str(ROOT / "docs")]
 
+import choices
 import evidence
 from reference_tables import axes_table, key_tables, room_tables, table
 
@@ -215,9 +216,11 @@ def main() -> int:
         fitted = ident.fit(ROOT / "raw_captive_data", db)[0]
         coefficients = Coefficients(fitted.campaign.vehicle, fitted.rows)
         readme = {"signs": signs(coefficients), "speed": speed(), "commands": whole_commands()}
+        prediction: dict[str, str] = {}
         boats = {"vehicles": evidence.vehicles(), "appendages": evidence.suboff_differences()}
         if not (only_check or chosen.quick):
             # A calibration takes minutes, so only a full run renews what follows from it.
+            prediction["choices"] = choices.choices(db, fitted.campaign)
             ident.calibrate("bb2", db)
             board, flown = run_all(db, None, None)
             main_case = next(one for one in flown if one.case.name == CASE)
@@ -227,6 +230,7 @@ def main() -> int:
     wanted = {
         ROOT / "README.md": readme,
         ROOT / "docs" / "evidence.md": boats,
+        ROOT / "docs" / "prediction.md": prediction,
         ROOT / "docs" / "errata.md": {"errata": errata()},
         ROOT / "docs" / "integration.md": {"steps": steps()},
         ROOT / "docs" / "terms.md": {"terms": term_table()},

@@ -208,8 +208,8 @@ class Room:
 
     def calibrated(self, path: Path) -> str:
         """A calibration as far as before its first flight, which takes minutes from there on."""
-        from ident.calibration.estimate import problem
         from ident.calibration.file import load_calibration, parameters
+        from ident.calibration.problem import problem
         from ident.estimates.draft import measured_rows
         from sim.boat.database import read_rows
         from sim.boat.vehicle import load_vehicle

@@ -11,8 +11,10 @@ import pandas as pd
 import pytest
 from click.testing import CliRunner
 
-from ident.calibration.estimate import calibrate, contradictions, problem
+from ident.calibration.estimate import calibrate
 from ident.calibration.file import apply, load_calibration, parameters
+from ident.calibration.problem import contradictions, problem
+from ident.calibration.sensitivity import sensitivity as what_decides
 from ident.calibration.version import calibrate as run
 from ident.calibration.version import calibrated_rows
 from ident.cli import main
@@ -178,6 +180,59 @@ def test_sources_that_contradict_one_another_are_named(folder, campaign, rows, t
     said = contradictions(problem(spec, where, campaign.vehicle, rows, chosen))
     assert {s.split(" differ in ")[1].split()[0] for s in said} == set(CHANNELS)
     assert all(s.startswith("contradictory data") for s in said)
+
+
+def test_the_evidence_frees_what_the_maneuver_asks_for_and_holds_the_rest(folder, rows, tmp_path):
+    from ident.database.store import commit
+
+    db = str(tmp_path / "db")
+    commit(db, rows, {"message": "captive"})
+    # A horizontal zigzag says nothing of the sail planes, and next to nothing of what the turn takes off its speed.
+    path = write_calibration(folder, GROUPS | {"sail_planes": ('["[ZM]_dB"]', 1.0)}, name="choosing")
+    path.write_text(
+        path.read_text("utf-8").replace('source = "made"', 'source = "made"\nchoose = "evidence"', 1), "utf-8"
+    )
+    done = run(path, db, left_out=False, posterior=120, seed=2)
+    found = {g.name: g for g in done.summary.groups}
+    chosen = {name for name, g in found.items() if g.chosen}
+    assert {"planes", "yaw_damping"} <= chosen <= set(GROUPS)
+    assert found["planes"].evidence > 5.0
+    assert found["sail_planes"].evidence <= 0.0
+    assert (found["sail_planes"].posterior.value, found["sail_planes"].posterior.sigma) == (1.0, 0.5)
+    new, _ = read_rows(db, done.version, "bb2")
+    old, _ = read_rows(db, 0, "bb2")
+    held = old["coefficient"].isin(["Z_dB", "M_dB"])
+    keys = ["coefficient", "part", "estimate", "value", "stderr", "calibration"]
+    pd.testing.assert_frame_equal(new.loc[held, keys], old.loc[held, keys])
+    # Few draws, and a posterior that is nearly normal: the optimum is their mean within the draws' own error.
+    drawn = done.summary.sampled
+    assert set(drawn.groups) == chosen
+    assert all(abs(g.shift) < 5.0 * g.shift_error + 0.3 for g in drawn.groups.values())
+    assert all(0.5 < g.width < 2.0 for g in drawn.groups.values())
+    kept = json.loads(own_version(db, "bb2", done.version).metadata["calibration"])
+    assert kept["sampled"]["groups"]["planes"]["q50"] == drawn.groups["planes"].q50
+
+
+@pytest.mark.parametrize(
+    ("options", "found"), [(["--sensitivity", "50"], "power of two"), (["--seed", "3"], "--seed goes with")]
+)
+def test_options_of_draws_that_cannot_be_are_refused(folder, rows, tmp_path, options, found):
+    from ident.database.store import commit
+
+    db = str(tmp_path / "db")
+    commit(db, rows, {"message": "captive"})
+    done = CliRunner().invoke(main, ["calibrate", str(write_calibration(folder)), "--db", db, *options])
+    assert done.exit_code == 2
+    assert found in done.output
+    assert len(versions(db)) == 1
+
+
+def test_what_decides_each_channel_of_a_flight_is_said(task):
+    found = {one.channel: one for one in what_decides(task, 4, workers=1)}
+    assert set(found) == set(CHANNELS)
+    for one in found.values():
+        assert 0.0 < one.along <= 1.0
+        assert set(one.groups) == set(GROUPS)
 
 
 def test_two_names_for_one_group_cannot_be_told_apart(folder, campaign, rows):

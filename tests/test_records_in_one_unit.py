@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ident.calibration.estimate import _channel
 from ident.calibration.file import Training
+from ident.calibration.problem import _channel
 from sim.files.record import Record, Written
 from sim.flight.series import Series
 

@@ -112,8 +112,8 @@ def test_a_calibration_learns_from_a_trial(campaign, rows, record, tmp_path, con
     """Its residuals are the noise where the coefficients are those of the flight."""
     from importlib.resources import files
 
-    from ident.calibration.estimate import problem
     from ident.calibration.file import CalibrationFile
+    from ident.calibration.problem import problem
 
     text = (files("sim") / "cases" / "hzz20.toml").read_text("utf-8")
     head, _, _ = text.partition("[reference]")

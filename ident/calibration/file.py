@@ -128,14 +128,15 @@ class CalibrationFile(Data):
     """A calibration file.
 
     ``starts_from``: ``version``, the version as it is; ``runs``, what the runs alone gave in it, so that
-    estimates come in as priors.
+    estimates come in as priors. ``choose``: ``all``, every group is free; ``evidence``, those whose freedom raises
+    the evidence of the model, and the others stay at their prior means.
 
     Attributes
     ----------
     name : Of the calibration.
     vehicle : Bundled vehicle, or a vehicle file beside this one.
     source : Where the training data come from.
-    starts_from : See above.
+    starts_from, choose : See above.
     training : Series that are learnt from.
     group : Coefficients that share a multiplier or offset.
     """
@@ -144,6 +145,7 @@ class CalibrationFile(Data):
     vehicle: str
     source: str
     starts_from: Literal["version", "runs"] = "version"
+    choose: Literal["all", "evidence"] = "all"
     training: Annotated[list[Training], Field(min_length=1)]
     group: Annotated[list[Group], Field(min_length=1)]
 

@@ -12,6 +12,13 @@ if TYPE_CHECKING:
     import pandas as pd
     from rich.console import Console
 
+    from ident.calibration.posterior import Sampled
+    from ident.calibration.sensitivity import Sensitivity
+
+
+# Shares of the variance that are printed; the JSON has them all.
+_SHARES = 4
+
 
 @dataclass(frozen=True)
 class Prior:
@@ -56,6 +63,8 @@ class Group:
     maneuvers_alone : What they say without the prior; None where that is next to nothing.
     away_from_prior : Distance of that from the prior, in their joint standard deviations.
     beyond_captive : Whether the captive error alone does not allow the posterior.
+    chosen : False for a group that the calibration held at its prior mean.
+    evidence : Change of the log evidence by its freedom, the others as chosen; positive where the maneuvers ask for it.
     """
 
     name: str
@@ -69,10 +78,14 @@ class Group:
     maneuvers_alone: Known | None
     away_from_prior: float | None
     beyond_captive: bool
+    chosen: bool = True
+    evidence: float | None = None
 
     @property
     def verdict(self) -> str:
         """What a posterior says: of an estimate, whether it agrees; of the captive error, whether it allows it."""
+        if not self.chosen:
+            return "held at its prior: the maneuvers do not ask for it"
         words = []
         if self.prior.estimate and self.away_from_prior is not None:
             agrees = "agrees" if self.away_from_prior < 2.0 else "disagrees"
@@ -143,6 +156,9 @@ class Summary:
     series : Every channel.
     left_out : The calibration without each source in turn; empty when that was not asked for.
     warnings : What to beware of.
+    evidence : log evidence of the chosen groups and of all of them, less that of none.
+    sampled : The posterior by draws, where that was asked for.
+    sensitivity : What decides each channel over the priors, where that was asked for.
     """
 
     calibration: str
@@ -157,10 +173,14 @@ class Summary:
     series: list[TrainedSeries]
     left_out: list[LeftOut]
     warnings: list[str]
+    evidence: dict[str, float]
+    sampled: Sampled | None = None
+    sensitivity: list[Sensitivity] | None = None
 
     def to_dict(self) -> dict[str, Any]:
-        """The summary for a program to read."""
-        return asdict(self)
+        """The summary for a program to read; without what was not asked for."""
+        found = asdict(self)
+        return {k: v for k, v in found.items() if v is not None}
 
 
 @dataclass(frozen=True)
@@ -218,13 +238,36 @@ class Calibrated:
         return html_table(title, ("group", *table.columns), rows)
 
 
+def _show_draws(summary: Summary, console: Console) -> None:
+    """Print the sampled posterior and what decides each channel."""
+    from rich.table import Table
+
+    sampled = summary.sampled
+    if sampled is not None:
+        title = f"Posterior by {sampled.independent:.0f} independent draws"
+        table = Table("group", "mean", "2.5 %", "median", "97.5 %", "shift from the optimum", "width", title=title)
+        for name, g in sampled.groups.items():
+            numbers = [f"{x:.3f}" for x in (g.mean, g.q025, g.q50, g.q975)]
+            table.add_row(on_screen(name), *numbers, f"{g.shift:+.2f} ± {g.shift_error:.2f}", f"{g.width:.2f}")
+        console.print(table)
+        console.print(on_screen(sampled.verdict), highlight=False)
+    if summary.sensitivity:
+        table = Table("case", "channel", "along", "total share of the variance over the priors, ± its standard error")
+        for one in summary.sensitivity:
+            shares = sorted(one.groups.items(), key=lambda g: -g[1].total)
+            known = [f"{n} {100 * s.total:.0f} ± {100 * s.total_error:.0f} %" for n, s in shares[:_SHARES]]
+            names = [on_screen(n) for n in (one.case, one.channel)]
+            table.add_row(*names, f"{100 * one.along:.0f} %", on_screen(", ".join(known)))
+        console.print(table)
+
+
 def show(done: Calibrated, console: Console) -> None:
     """Print priors and posteriors, the series, what was left out, and what to beware of."""
     from rich.markup import escape
     from rich.table import Table
 
     summary = done.summary
-    table = Table("group", "prior", "captive error", "posterior", "maneuvers alone", "verdict")
+    table = Table("group", "prior", "captive error", "posterior", "maneuvers alone", "evidence", "verdict")
     table.title = on_screen(f"{summary.calibration}: multipliers on version {summary.parent}")
     for g in summary.groups:
         alone, prior, after = g.maneuvers_alone, g.prior, g.posterior
@@ -235,9 +278,13 @@ def show(done: Calibrated, console: Console) -> None:
             f"± {g.captive_sigma:.2f}",
             f"[{colour}]{after.value:.3f} ± {after.sigma:.3f}[/]",
             "-" if alone is None else f"{alone.value:.2f} ± {alone.sigma:.2f}",
+            "-" if g.evidence is None else f"{g.evidence:+.1f}",
             g.verdict,
         )
     console.print(table)
+    words = ", ".join(f"{k} {v:.1f}" for k, v in summary.evidence.items())
+    console.print(f"log evidence over no group free: {words}", highlight=False)
+    _show_draws(summary, console)
     table = Table("case", "source", "channel", "RMSE", "sigma", title="Training series, units of the references")
     for s in summary.series:
         names = [on_screen(name) for name in (s.case, s.source, s.channel)]

@@ -5,16 +5,20 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from ident.calibration.estimate import Channel, Estimate, Problem, contradictions, problem
+from ident.calibration.estimate import Estimate
 from ident.calibration.estimate import calibrate as most_probable
 from ident.calibration.file import Parameter, apply, load_calibration, parameters
+from ident.calibration.posterior import Sampled, emcee, sample
+from ident.calibration.problem import Channel, Problem, contradictions, problem
 from ident.calibration.result import Calibrated, Group, Known, LeftOut, Prior, Summary, TrainedSeries
+from ident.calibration.selection import Comparison, compare
+from ident.calibration.sensitivity import sensitivity as what_decides
 from ident.database.lock import WAIT
 from ident.database.store import commit, digest
 from ident.estimates.draft import measured_rows
@@ -71,7 +75,7 @@ def from_data(parameter: Parameter, value: float, sigma: float) -> tuple[float, 
     return float(alone), float(gained**-0.5)
 
 
-def _group(parameter: Parameter, value: float, sigma: float) -> Group:
+def _group(parameter: Parameter, value: float, sigma: float, chosen: bool, evidence: float) -> Group:
     prior = parameter.group.prior
     alone = from_data(parameter, value, sigma)
     away = None
@@ -91,6 +95,8 @@ def _group(parameter: Parameter, value: float, sigma: float) -> Group:
         maneuvers_alone=None if alone is None else Known(*alone),
         away_from_prior=away,
         beyond_captive=parameter.beyond_captive(value),
+        chosen=chosen,
+        evidence=float(f"{evidence:.4g}"),
     )
 
 
@@ -189,6 +195,59 @@ def _rounded(estimate: Estimate) -> Estimate:
     )
 
 
+@dataclass(frozen=True)
+class Solved:
+    """The multipliers of a calibration.
+
+    Attributes
+    ----------
+    task, estimate : With the groups that are free, and their optimum.
+    comparison : What the maneuvers ask for, of all groups.
+    kept : Places of the free groups among all.
+    """
+
+    task: Problem
+    estimate: Estimate
+    comparison: Comparison
+    kept: tuple[int, ...]
+
+
+def _solved(every: Problem, choose: str, workers: int | None, each: Callable[[str], None]) -> Solved:
+    """The optimum of all groups, or of those that the evidence chooses."""
+    whole = most_probable(every, workers, each)
+    comparison = compare(every, whole)
+    if choose == "all":
+        return Solved(every, _rounded(whole), comparison, tuple(range(len(every.chosen))))
+    if not comparison.kept:
+        text = "a file whose groups can explain what the references have"
+        raise InputError("choose", "maneuvers that ask for no group", text)
+    task = every.freeing(comparison.kept)
+    each(f"{len(comparison.kept)} of {len(every.chosen)} groups are asked for")
+    start = whole.theta[list(comparison.kept)]
+    return Solved(task, _rounded(most_probable(task, workers, each, start)), comparison, comparison.kept)
+
+
+def _groups(every: Problem, solved: Solved) -> list[Group]:
+    """Every group as it stands: free ones at their posterior, held ones at their prior."""
+    found, gain = [], solved.comparison.gain
+    free = dict(zip(solved.kept, zip(solved.estimate.theta, solved.estimate.deviation, strict=True), strict=True))
+    for i, parameter in enumerate(every.chosen):
+        value, sigma = free.get(i, (parameter.mean, parameter.sigma))
+        found.append(_group(parameter, float(value), float(sigma), i in free, gain[i]))
+    return found
+
+
+def _in_force(solved: Solved) -> tuple[list[Parameter], Estimate]:
+    """What changes the rows: free groups, and held ones whose prior mean changes something, with its error."""
+    held = [p for p in solved.task.held if p.mean != p.neutral]
+    theta = np.concatenate([solved.estimate.theta, [p.mean for p in held]])
+    covariance = np.zeros((theta.size, theta.size))
+    k = len(solved.estimate.theta)
+    covariance[:k, :k] = solved.estimate.covariance
+    covariance[range(k, theta.size), range(k, theta.size)] = [p.sigma**2 for p in held]
+    return [*solved.task.chosen, *held], replace(solved.estimate, theta=theta, covariance=covariance)
+
+
 def calibrate(
     name: str | os.PathLike[str],
     db: str | os.PathLike[str] = "coeff_db",
@@ -198,6 +257,9 @@ def calibrate(
     workers: int | None = None,
     each: Callable[[str], None] = lambda text: None,
     wait: float = WAIT,
+    posterior: int = 0,
+    sensitivity: int = 0,
+    seed: int = 0,
 ) -> Calibrated:
     """Estimate multipliers of coefficient groups from free-running maneuvers; commit the result.
 
@@ -212,6 +274,10 @@ def calibrate(
     workers : Threads; the result does not depend on it.
     each : Called with a line of text as the work goes on.
     wait : How long to wait for other writers of the database [s].
+    posterior : Also draw the posterior so many times, and hold the draws against the quadratic (extra ``posterior``).
+    sensitivity : Also say which prior decides each channel, by a design of this size, a power of two (extra
+        ``posterior``).
+    seed : Of draws and design.
 
     Returns
     -------
@@ -220,7 +286,8 @@ def calibrate(
     Raises
     ------
     InputError
-        For a calibration, case, reference, database or version that does not exist or fit.
+        For a calibration, case, reference, database or version that does not exist or fit, or a package that is
+        not installed.
 
     Examples
     --------
@@ -231,17 +298,21 @@ def calibrate(
     (1, ['rudders', 'yaw_damping'])
     """
     name, db = os.fspath(name), os.fspath(db)
+    if posterior:
+        emcee()
     spec, where, own = load_calibration(name)
     vehicle = load_vehicle(spec.vehicle, beside=where)
     base = captive_version(db, vehicle.name, version)
     rows, _ = read_rows(db, base.number, vehicle.name)
     if spec.starts_from == "runs":
         rows = measured_rows(rows)
-    chosen = parameters(spec, vehicle, rows, where)
-    task = problem(spec, where, vehicle, rows, chosen)
-    estimate = _rounded(most_probable(task, workers, each))
+    every = problem(spec, where, vehicle, rows, parameters(spec, vehicle, rows, where))
+    # Before the search, so that a size which cannot be is refused at once.
+    shares = what_decides(every, sensitivity, seed, workers, each) if sensitivity else None
+    solved = _solved(every, spec.choose, workers, each)
+    task, estimate = solved.task, solved.estimate
     without = _left_out(task, estimate, workers, each) if left_out else []
-    sigma = estimate.deviation
+    drawn = sample(task, estimate, posterior, seed, workers, each) if posterior else None
     summary = Summary(
         calibration=spec.name,
         vehicle=vehicle.name,
@@ -250,24 +321,33 @@ def calibrate(
         source=spec.source,
         file_digest=own,
         trained=list(dict.fromkeys(f"{c.key[0]}:{c.key[1]}" for c in task.channels)),
-        groups=[_group(p, float(x), float(s)) for p, x, s in zip(chosen, estimate.theta, sigma, strict=True)],
+        groups=_groups(every, solved),
         covariance=estimate.covariance.tolist(),
         series=[
             TrainedSeries(*key, float(f"{rmse:.4g}"), float(f"{estimate.sigma[key]:.4g}"))
             for key, rmse in estimate.rms.items()
         ],
         left_out=without,
-        warnings=_warnings(task, estimate, without),
+        warnings=_warnings(task, estimate, without, drawn),
+        evidence={
+            "chosen": float(f"{solved.comparison.log_evidence:.4g}"),
+            "all": float(f"{solved.comparison.every:.4g}"),
+        },
+        sampled=drawn,
+        sensitivity=shares,
     )
-    done = calibrated_rows(rows, chosen, estimate)
+    done = calibrated_rows(rows, *_in_force(solved))
     number, new = commit(db, done, _metadata(base, task, summary, message), wait)
     return Calibrated(summary, number, new, digest(done))
 
 
-def _warnings(task: Problem, estimate: Estimate, without: list[LeftOut]) -> list[str]:
+def _warnings(task: Problem, estimate: Estimate, without: list[LeftOut], drawn: Sampled | None) -> list[str]:
     """What to beware of, that it did not converge first."""
     halted = [] if estimate.converged else [f"not converged after {estimate.rounds} rounds"]
-    return halted + contradictions(task) + _shifts(task, without) + _identifiability(task, estimate)
+    said = halted + contradictions(task) + _shifts(task, without) + _identifiability(task, estimate)
+    if drawn is not None and not drawn.tells:
+        said.append(f"the quadratic is not the posterior: {drawn.verdict}")
+    return said
 
 
 def _metadata(base: Version, task: Problem, summary: Summary, message: str) -> dict[str, str]:

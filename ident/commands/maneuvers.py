@@ -220,10 +220,34 @@ def _all(
 @VERSION
 @MESSAGE
 @click.option("--left-out/--no-left-out", default=True, show_default=True, help="Repeat without each source in turn.")
+@click.option(
+    "--posterior",
+    type=click.IntRange(min=1),
+    default=None,
+    metavar="N",
+    help="Also draw the posterior N times (emcee).",
+)
+@click.option(
+    "--sensitivity",
+    type=click.IntRange(min=2),
+    default=None,
+    metavar="N",
+    help="Also say which prior decides each channel; N a power of two (SALib).",
+)
+@click.option("--seed", type=click.IntRange(0, 2**32 - 1), default=None, help="Of --posterior and --sensitivity; 0.")
 @json_to("Write priors, posteriors and diagnostics.")
 @WAIT
 def calibrate(
-    name: str, db: str, version: int | None, message: str, left_out: bool, json_path: str | None, wait: float
+    name: str,
+    db: str,
+    version: int | None,
+    message: str,
+    left_out: bool,
+    posterior: int | None,
+    sensitivity: int | None,
+    seed: int | None,
+    json_path: str | None,
+    wait: float,
 ) -> None:
     """Estimate multipliers of coefficient groups from free-running maneuvers.
 
@@ -233,14 +257,27 @@ def calibrate(
     \b
     Example: ident calibrate bb2
              ident calibrate my_boat.toml --no-left-out --json -
+             ident calibrate bb2 --no-left-out --posterior 4000
+             ident calibrate bb2 --no-left-out --sensitivity 64
     """
     import ident
     from ident.calibration.result import show
 
+    if seed is not None and not (posterior or sensitivity):
+        raise click.UsageError("--seed goes with --posterior or --sensitivity")
     console = console_for(quiet=json_path == "-")
     with console.status("calibrating") as status:
         done = ident.calibrate(
-            name, db, version, message, left_out, each=lambda text: status.update(on_screen(text)), wait=wait
+            name,
+            db,
+            version,
+            message,
+            left_out,
+            each=lambda text: status.update(on_screen(text)),
+            wait=wait,
+            posterior=posterior or 0,
+            sensitivity=sensitivity or 0,
+            seed=seed or 0,
         )
     show(done, console)
     if json_path:
