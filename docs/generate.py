@@ -11,8 +11,8 @@ import argparse
 import csv
 import sys
 import tempfile
+from dataclasses import asdict
 from pathlib import Path
-from typing import Any
 
 ROOT = Path(__file__).resolve().parents[1]
 # The documentation is of this checkout, whatever copy of the package is installed.
@@ -26,8 +26,9 @@ import ident
 from ident.analysis.derivatives import derivatives
 from ident.checks.findings import rules
 from ident.commands import times
+from ident.validation.board import Scoreboard
 from ident.validation.figures import case_figure
-from ident.validation.scoreboard import entries, run_all
+from ident.validation.scoreboard import run_all
 from sim.bench.guard import recorded
 from sim.bench.step_errors import recorded as step_errors
 from sim.boat import catalogue
@@ -87,46 +88,46 @@ def number(value: float | None) -> str:
     return "-" if value is None else f"{value:.3g}"
 
 
-def provenance(board: dict[str, Any]) -> str:
+def provenance(board: Scoreboard) -> str:
     """Which versions are compared, what they were trained on, and the geometric means."""
     lines = []
-    for name, trained in board["trained_on"].items():
-        case = next(c for c in board["cases"] if c.get("vehicle") == name)
-        parent = case["parent"]
-        before = f"from version {parent['version']} (`{parent['digest'][:16]}`)" if parent else "no parent"
+    for name, trained in board.trained_on.items():
+        case = next(c for c in board.cases if c.validation and c.validation.case.vehicle == name)
+        parent = case.parent
+        before = f"from version {parent.version} (`{parent.digest[:16]}`)" if parent else "no parent"
         source = f"trained on {', '.join(trained)}" if trained else "predicted or as published, trained on no maneuver"
-        database = case["database"]
+        database = case.database
         lines.append(f"* `{name}`: version {database['version']} (`{database['digest'][:16]}`), {before}, {source}.")
-    ratios = [board[k] for k in ("geometric_mean_ratio", "geometric_mean_ratio_to_parent")]
+    ratios = [asdict(mean) for mean in (board.mean_ratio, board.mean_ratio_to_parent)]
     means = [
         [f"{kind} cases", *["-" if ratio[kind] is None else f"{ratio[kind]:.2f}" for ratio in ratios]]
         for kind in ("trained", "untrained")
     ]
-    of = board["geometric_mean_ratio_of"]
+    of = asdict(board.mean_ratio_by_version)
     versions = [["all cases", *["-" if x is None else f"{x:.2f}" for x in of.values()]]]
     columns = table(["to the published model", *[k.replace("_", " ") for k in of]], versions)
     header = ["geometric mean of the error ratios, calibrated", "to the published model", "to the predicted version"]
-    worst = board["worst_ratio"]
-    place = f"{worst['case']}, {worst['source']}, `{worst['channel']}`"
-    return "\n".join(
-        [*lines, "", columns, "", table(header, means), "", f"Worst ratio: {worst['ratio']:.2f} ({place})."]
-    )
+    worst = board.worst_ratio
+    assert worst is not None
+    place = f"{worst.case}, {worst.source}, `{worst.channel}`"
+    return "\n".join([*lines, "", columns, "", table(header, means), "", f"Worst ratio: {worst.ratio:.2f} ({place})."])
 
 
-def accuracy(board: dict[str, Any]) -> str:
+def accuracy(board: Scoreboard) -> str:
     """Errors of every case beside the parent version and the published model, and the metrics of the main one."""
     keys = ("measured_only_rmse", "parent_rmse", "rmse", "published_model_rmse", "ratio", "ratio_to_parent")
     errors = [
-        [case["case"], source, f"`{channel}`", e["unit"], *[number(e[k]) for k in keys], yes_no(case["trained"])]
-        for case, source, channel, e in entries(board["cases"])
+        [case.name, source, f"`{channel}`", e["unit"], *[number(e[k]) for k in keys], yes_no(case.trained)]
+        for case, source, channel, compared in board.comparisons
+        for e in [compared.to_dict()]
     ]
     header = ["case", "reference", "channel", "unit", "measured only", "predicted", "calibrated", "published model"]
     header += ["ratio", "to predicted", "trained"]
     labels = ["simulated", "EXP", "CFD", "published_model"]
-    main_case = next(case for case in board["cases"] if case["case"] == CASE)
+    main_case = next(one for one in board.flown if one.case.name == CASE)
     metrics = [
         [f"`{m}`", *[number(values[c]) for c in labels]]
-        for m, values in main_case["metrics"].items()
+        for m, values in main_case.metrics.items()
         if any(values[c] is not None for c in labels)
     ]
     return "\n\n".join(
@@ -222,8 +223,8 @@ def main() -> int:
             # A calibration takes minutes, so only a full run renews what follows from it.
             prediction["choices"] = choices.choices(db, fitted.campaign)
             ident.calibrate("bb2", db)
-            board, flown = run_all(db, None, None)
-            main_case = next(one for one in flown if one.case.name == CASE)
+            board = run_all(db, None, None)
+            main_case = next(one for one in board.flown if one.case.name == CASE)
             case_figure(main_case, ROOT / "docs" / f"{CASE}.png")
             readme["accuracy"] = accuracy(board)
             boats["predictions"] = evidence.predictions(db)

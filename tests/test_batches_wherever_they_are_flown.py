@@ -88,10 +88,10 @@ def test_flights_from_a_sources_own_start_are_part_of_the_batch(case, campaign, 
     reference = case.reference.model_copy(update={"initial": {"EXP": start}})
     own = case.model_copy(update={"reference": reference})
     bands = fly_samples(own, campaign.vehicle, rows.assign(stderr=0.0), 2)
-    assert bands.own["EXP"]["u"][0] == pytest.approx(
+    assert bands.as_started["EXP"]["u"][0] == pytest.approx(
         simulate(own.started_as("EXP"), Coefficients(campaign.vehicle, rows))["u"], rel=1e-9
     )
-    assert bands.own["EXP"]["U"][:, 0] == pytest.approx([4.0, 4.0])
+    assert bands.as_started["EXP"]["U"][:, 0] == pytest.approx([4.0, 4.0])
     assert bands.channels["U"][:, 0] == pytest.approx(np.full(2, own.initial.speed_mps))
 
 

@@ -15,7 +15,8 @@ from hypothesis import given
 from hypothesis import settings as given_settings
 from hypothesis import strategies as st
 
-from ident.validation.bands import Bands, variance_shares
+from ident.validation.band_summary import variance_shares
+from ident.validation.bands import Bands
 from ident.validation.draws import draw, factor, scores
 from sim.boat.row_codec import correlation_matrix
 from sim.files.errors import InputError
@@ -30,8 +31,10 @@ CORE_TYPES = {
 }
 ELSEWHERE = """
 import hashlib, json, sys
+from dataclasses import asdict
 import numpy as np
-from ident.validation.bands import Bands, variance_shares
+from ident.validation.band_summary import variance_shares
+from ident.validation.bands import Bands
 from ident.validation.draws import draw, scores
 correlation = np.load(sys.argv[1])
 drawn = draw(correlation, 60, seed=3)
@@ -41,7 +44,8 @@ channel = (3.0 * drawn[:, 0] + drawn[:, 1] + drawn[:, 500])[:, None] * np.cos(0.
 shares = variance_shares(Bands(np.arange(50.0), {"psi": channel}, {}, drawn, correlation, names, 0, 3), "psi")
 digest = lambda values: hashlib.sha256(np.ascontiguousarray(values).tobytes()).hexdigest()
 product = drawn.T @ drawn[:, :200]
-print(json.dumps({"product": digest(product), "same": [digest(drawn), digest(within), shares]}))
+listed = [asdict(one) for one in shares]
+print(json.dumps({"product": digest(product), "same": [digest(drawn), digest(within), listed]}))
 """
 
 
@@ -180,10 +184,10 @@ def test_standard_errors_of_shares_cover_the_truth():
     for seed in range(300):
         drawn = draw(np.eye(2), 100, seed)
         channel = (0.6 * drawn[:, 0] + 0.8 * drawn[:, 1])[:, None]
-        found = {s["coefficient"]: s for s in variance_shares(_bands(drawn, np.eye(2), channel, ["A", "B"]), "psi")}
+        found = {s.coefficient: s for s in variance_shares(_bands(drawn, np.eye(2), channel, ["A", "B"]), "psi")}
         if "A" in found:
             listed += 1
-            inside += abs(found["A"]["share"] - 0.36) < 2.0 * found["A"]["standard_error"]
+            inside += abs(found["A"].share - 0.36) < 2.0 * found["A"].standard_error
     assert listed >= 290
     # Of 300 with probability 0.92 (the jackknife of a skewed share), five standard deviations.
     assert inside >= 0.84 * listed

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ident.validation.bands import Bands, fly_samples, inside, variance_shares
+from ident.validation.band_summary import inside, variance_shares
+from ident.validation.bands import Bands, fly_samples
 from ident.validation.draws import draw
 from sim.boat.coefficients import Coefficients
 from sim.boat.row_codec import correlation_matrix
@@ -78,10 +79,10 @@ def test_variance_shares_name_the_only_uncertain_coefficient(short_case, campaig
     for seed in (0, 1, 2):
         bands = fly_samples(short_case[0], campaign.vehicle, alone, 60, seed=seed)
         first = variance_shares(bands, "theta")[0]
-        assert first["coefficient"] == "M_uq"
+        assert first.coefficient == "M_uq"
         # Its values account for all there is, as nearly as so many samples tell.
-        assert first["share"] > 1.0 - 5.0 * first["standard_error"]
-        assert first["share"] > 5.0 * first["standard_error"]
+        assert first.share > 1.0 - 5.0 * first.standard_error
+        assert first.share > 5.0 * first.standard_error
 
 
 def test_reference_made_of_the_middle_of_the_band_lies_inside(short_case, campaign, rows):
@@ -98,10 +99,10 @@ def test_reference_made_of_the_middle_of_the_band_lies_inside(short_case, campai
 
 def _assert_shares(found, expected):
     """Within five standard errors, which are what so many samples allow."""
-    assert {s["coefficient"] for s in found} == set(expected)
+    assert {s.coefficient for s in found} == set(expected)
     for one in found:
-        assert abs(one["share"] - expected[one["coefficient"]]) < 5.0 * one["standard_error"] + 1e-3
-        assert one["standard_error"] < 0.03
+        assert abs(one.share - expected[one.coefficient]) < 5.0 * one.standard_error + 1e-3
+        assert one.standard_error < 0.03
 
 
 def test_shares_of_correlated_values_closed_form():

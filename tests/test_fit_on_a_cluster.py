@@ -13,7 +13,7 @@ from ident.captive.campaign import read_campaign
 from ident.cluster import cluster as over
 from ident.fitting.fit import fit
 from ident.identification import stage_solve
-from ident.validation import bands
+from ident.validation import band_summary, bands
 from sim.files.errors import InputError
 from sim.flight.case import load_case
 
@@ -95,10 +95,10 @@ def test_records_in_a_file_are_those_in_memory(campaign, rows, monkeypatch):
     assert isinstance(filed.channels["psi"].base, np.memmap) or isinstance(filed.channels["psi"], np.memmap)
     for channel, values in held.channels.items():
         assert np.array_equal(values, filed.channels[channel], equal_nan=True), channel
-    few = bands.variance_shares(held, "psi")
-    monkeypatch.setattr(bands, "_SQUARE", 0)
-    for one, other in zip(few, bands.variance_shares(held, "psi"), strict=True):
-        assert one["share"] == pytest.approx(other["share"], rel=1e-9)
+    few = band_summary.variance_shares(held, "psi")
+    monkeypatch.setattr(band_summary, "_SQUARE", 0)
+    for one, other in zip(few, band_summary.variance_shares(held, "psi"), strict=True):
+        assert one.share == pytest.approx(other.share, rel=1e-9)
 
 
 def test_hundred_thousand_samples_of_the_zigzag_fit_a_machine_of_24_GB(campaign, rows, monkeypatch):

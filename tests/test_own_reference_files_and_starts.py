@@ -12,7 +12,8 @@ import pytest
 from click.testing import CliRunner
 
 from ident.cli import main
-from ident.validation.bands import fly_samples, inside
+from ident.validation.band_summary import inside
+from ident.validation.bands import fly_samples
 from ident.validation.validate import validate
 from sim.boat.coefficients import Coefficients
 from sim.files.errors import InputError

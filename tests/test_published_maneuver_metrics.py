@@ -94,8 +94,9 @@ def test_every_bundled_case_flies_and_is_compared(fitted_db):
     """The scoreboard: a finite error for every channel, ratios over the published model."""
     from ident.validation.scoreboard import run_all
 
-    board, flown = run_all(fitted_db, None, None)
-    assert [c["case"] for c in board["cases"]] == [f.case.name for f in flown]
+    flown = run_all(fitted_db, None, None)
+    board = flown.to_dict()
+    assert [c["case"] for c in board["cases"]] == [one.case.name for one in flown.flown]
     assert {"hzz20", "vzz10-06kt", "vzz10-10kt", "roll-decay"} <= {c["case"] for c in board["cases"]}
     for case in board["cases"]:
         for channels in case["references"].values():

@@ -13,7 +13,9 @@ from rich.console import Console
 from ident.captive.campaign import read_campaign
 from ident.database.store import commit, database_rows
 from ident.identification.identify import identify
-from ident.validation.scoreboard import geometric_mean, is_trained, run_all, show
+from ident.validation.board import geometric_mean
+from ident.validation.scoreboard import is_trained, run_all
+from ident.validation.scoreboard_tables import show
 from ident.validation.validate import validate
 
 ROOT = Path(__file__).parents[1]
@@ -39,7 +41,13 @@ def _suboff():
 def board(database):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("ident.validation.scoreboard.case_names", lambda folder: CASES)
-        return run_all(database, None, None, workers=2)[0]
+        return run_all(database, None, None, workers=2)
+
+
+@pytest.fixture(scope="module")
+def printed(board):
+    """What a program reads of the board."""
+    return board.to_dict()
 
 
 def _entries(board):
@@ -49,10 +57,10 @@ def _entries(board):
                 yield case, source, channel, entry
 
 
-def test_every_error_is_that_of_a_single_run_of_its_version(database, board):
+def test_every_error_is_that_of_a_single_run_of_its_version(database, printed):
     own = {name: [validate(name, database, v).to_dict()["references"] for v in (2, 0)] for name in CASES[:3]}
     seen = 0
-    for case, source, channel, entry in _entries(board):
+    for case, source, channel, entry in _entries(printed):
         this, parent = (one[source][channel] for one in own[case["case"]])
         assert entry["rmse"] == this["rmse"]
         assert entry["published_model_rmse"] == this["published_model_rmse"]
@@ -63,48 +71,48 @@ def test_every_error_is_that_of_a_single_run_of_its_version(database, board):
     assert seen == sum(len(c) for pair in own.values() for c in pair[0].values())
 
 
-def test_means_are_of_trained_and_untrained_cases(board):
-    trained = {case["case"]: case["trained"] for case in board["cases"]}
+def test_means_are_of_trained_and_untrained_cases(printed):
+    trained = {case["case"]: case["trained"] for case in printed["cases"]}
     assert trained == {name: name == "vzz10-10kt" for name in CASES}
     for key, name in (("geometric_mean_ratio", "ratio"), ("geometric_mean_ratio_to_parent", "ratio_to_parent")):
         for kind in ("trained", "untrained"):
-            ratios = [e[name] for case, *_, e in _entries(board) if case["trained"] == (kind == "trained")]
-            assert board[key][kind] == pytest.approx(np.prod(ratios) ** (1.0 / len(ratios)), rel=1e-9)
-    assert board["worst_ratio"]["ratio"] == max(e["ratio"] for *_, e in _entries(board))
+            ratios = [e[name] for case, *_, e in _entries(printed) if case["trained"] == (kind == "trained")]
+            assert printed[key][kind] == pytest.approx(np.prod(ratios) ** (1.0 / len(ratios)), rel=1e-9)
+    assert printed["worst_ratio"]["ratio"] == max(e["ratio"] for *_, e in _entries(printed))
 
 
-def test_parent_is_the_vehicles_own_earlier_version(board):
+def test_parent_is_the_vehicles_own_earlier_version(printed):
     """SUBOFF's version comes after BB2's, which is no parent of it."""
-    parents = {case["case"]: case["parent"] for case in board["cases"]}
+    parents = {case["case"]: case["parent"] for case in printed["cases"]}
     assert parents["suboff-hzz10"] is None
     assert {parents[name]["version"] for name in CASES[:4]} == {0}
-    versions = {case["case"]: case["database"]["version"] for case in board["cases"]}
+    versions = {case["case"]: case["database"]["version"] for case in printed["cases"]}
     assert versions == dict.fromkeys(CASES[:4], 2) | {"suboff-hzz10": 1}
-    assert board["trained_on"] == {"bb2": ["vzz10-10kt:CFD"], "suboff": []}
+    assert printed["trained_on"] == {"bb2": ["vzz10-10kt:CFD"], "suboff": []}
 
 
 def test_first_version_has_no_parent(database):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("ident.validation.scoreboard.case_names", lambda folder: CASES[:1])
-        first = run_all(database, 0, None)[0]
+        first = run_all(database, 0, None).to_dict()
     entry = first["cases"][0]["references"]["EXP"]["phi"]
     assert (first["cases"][0]["parent"], entry["parent_rmse"], entry["ratio_to_parent"]) == (None, None, None)
     assert first["geometric_mean_ratio_to_parent"] == {"trained": None, "untrained": None}
 
 
-def test_board_does_not_depend_on_workers(database, board):
+def test_board_does_not_depend_on_workers(database, printed):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("ident.validation.scoreboard.case_names", lambda folder: CASES)
-        alone = run_all(database, None, None, workers=1)[0]
-    assert json.dumps(alone) == json.dumps(board)
+        alone = run_all(database, None, None, workers=1).to_dict()
+    assert json.dumps(alone) == json.dumps(printed)
 
 
 def test_print_names_worst_case_and_cases_without_reference(board):
     console = Console(record=True, width=200, file=io.StringIO())
     show(board, console)
     text = console.export_text()
-    at = board["worst_ratio"]
-    assert f"worst ratio: {at['ratio']:.2f} ({at['case']} {at['source']} {at['channel']})" in text
+    at = board.worst_ratio
+    assert f"worst ratio: {at.ratio:.2f} ({at.case} {at.source} {at.channel})" in text
     below = text[text.index("Without a reference series") :]
     assert "meander" in below
     assert "bb2 trained on: vzz10-10kt:CFD" in below

@@ -41,5 +41,5 @@ plt.legend()
 
 # %%
 # Which coefficients cause the width of the heading's band.
-for entry in done.to_dict()["bands"]["variance_shares"]["psi"]:
-    print(f"{entry['coefficient']:>10} {100 * entry['share']:4.0f} %")
+for entry in done.band_summary.variance_shares["psi"]:
+    print(f"{entry.coefficient:>10} {100 * entry.share:4.0f} %")

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,7 +14,58 @@ from ident.commands.shared import DB, MESSAGE, OUT, VERSION, WAIT, console_for, 
 from ident.text import on_screen, visible
 
 if TYPE_CHECKING:
+    from ident.validation.board import Scoreboard
     from ident.validation.result import Validation
+
+
+_OF_ONE_CASE = ("vehicle", "speed", "depth", "angle", "reference", "trial", "frame")
+
+
+@dataclass(frozen=True)
+class ValidateOptions:
+    """What `ident validate` was asked: one case, or every case; from which version; against what; with which bands."""
+
+    case: str | None
+    every: bool
+    cases: Path | None
+    db: str
+    version: int | None
+    out: Path
+    json_path: str | None
+    figures: str
+    strict: bool
+    samples: int | None
+    seed: int
+    dask: str | None
+    left_out: tuple[str, ...]
+    loads: str | None
+    vehicle: str | None
+    speed: float | None
+    depth: float | None
+    angle: float | None
+    reference: Path | None
+    trial: Path | None
+    frame: str | None
+
+    def of_one_case(self) -> dict[str, Any]:
+        """What goes with a single case only, as ``ident.validate`` takes it."""
+        return {name: getattr(self, name) for name in _OF_ONE_CASE}
+
+    def check(self) -> None:
+        """Refuse options that do not go together. Raises ``click.UsageError``."""
+        alone = "--vehicle, --speed, --depth, --angle, --reference, --frame"
+        for wrong, text in (
+            (self.case == "", "--case is empty; give the name of a case or the path of a case file"),
+            ((self.case is None) == (not self.every), "give either --case NAME or --all"),
+            (self.every and any(self.of_one_case().values()), f"{alone} go with --case"),
+            (self.loads and self.every, "--loads goes with --case"),
+            (self.cases and not self.every, "--cases goes with --all"),
+            (self.dask and not self.samples, "--dask goes with --samples"),
+            (self.frame and not self.reference, "--frame goes with --reference"),
+            (self.trial and not self.reference, "--trial goes with --reference"),
+        ):
+            if wrong:
+                raise click.UsageError(text)
 
 
 @click.command()
@@ -56,23 +109,7 @@ if TYPE_CHECKING:
     default=None,
     help="Frame of --reference: source is x aft, z up; program x forward, z down. The case's by default.",
 )
-def validate(
-    case: str | None,
-    every: bool,
-    cases: Path | None,
-    db: str,
-    version: int | None,
-    out: Path,
-    json_path: str | None,
-    figures: str,
-    strict: bool,
-    samples: int | None,
-    seed: int,
-    dask: str | None,
-    left_out: tuple[str, ...],
-    loads: str | None,
-    **own: Any,
-) -> None:
+def validate(**options: Any) -> None:
     """Fly a maneuver from the database and compare it with its references.
 
     \b
@@ -86,43 +123,26 @@ def validate(
              ident validate --all
              ident validate --all --samples 200
     """
-    if case == "":
-        raise click.UsageError("--case is empty; give the name of a case or the path of a case file")
-    if (case is None) == (not every):
-        raise click.UsageError("give either --case NAME or --all")
-    if every and any(own.values()):
-        raise click.UsageError("--vehicle, --speed, --depth, --angle, --reference, --frame go with --case")
-    if loads and every:
-        raise click.UsageError("--loads goes with --case")
-    if cases and not every:
-        raise click.UsageError("--cases goes with --all")
-    if dask and not samples:
-        raise click.UsageError("--dask goes with --samples")
-    if own["frame"] and not own["reference"]:
-        raise click.UsageError("--frame goes with --reference")
-    if own["trial"] and not own["reference"]:
-        raise click.UsageError("--trial goes with --reference")
-    console = console_for(quiet=json_path == "-")
-    with equilibrium_of(case or "of --all"):
-        done, board = (
-            ([_one(case, db, version, own, left_out, console)], None)
-            if case
-            else _all(db, version, cases, left_out, console)
-        )
-    if samples:
-        done = _with_bands(done, samples, seed, dask, console)
-        board = board and _board_with_bands(board, done, out, console, figures)
-    for figure in _figures(done, out, figures):
+    asked = ValidateOptions(**options)
+    asked.check()
+    console = console_for(quiet=asked.json_path == "-")
+    with equilibrium_of(asked.case or "of --all"):
+        board = _all(asked, console) if asked.every else None
+        done = [_one(asked, console)] if board is None else board.flown
+    if asked.samples:
+        done = _with_bands(done, asked, console)
+        board = board and _board_with_bands(board, done, asked, console)
+    for figure in _figures(done, asked.out, asked.figures):
         console.print(f"figure: {on_screen(figure)}", highlight=False)
-    by_source = _loads(done[0], loads, out, console) if loads else {}
-    if json_path:
-        result = done[0].to_dict() | by_source if board is None else board
-        emit(result | ({"without": list(left_out)} if left_out else {}), json_path)
+    by_source = _loads(done[0], asked.loads, asked.out, console) if asked.loads else {}
+    if asked.json_path:
+        result = done[0].to_dict() | by_source if board is None else board.to_dict()
+        emit(result | ({"without": list(asked.left_out)} if asked.left_out else {}), asked.json_path)
     unfinished = [one.case.name for one in done if not one.complete]
     if unfinished:
         click.echo(f"left the finite numbers: {', '.join(map(visible, unfinished))}", err=True)
         raise click.exceptions.Exit(1)
-    if strict and not all(one.passed for one in done):
+    if asked.strict and not all(one.passed for one in done):
         raise click.exceptions.Exit(1)
 
 
@@ -133,9 +153,9 @@ def _loads(done: Validation, by: str, out: Path, console: Any) -> dict[str, Any]
     table, data, figure = write_loads(done, by, out)
     for path in (data, figure):
         console.print(f"loads: {on_screen(path)}", highlight=False)
-    sources = {str(name): own.drop(columns=["t_s", "source"]) for name, own in table.groupby("source", sort=False)}
+    sources = {str(name): rows.drop(columns=["t_s", "source"]) for name, rows in table.groupby("source", sort=False)}
     time = table.loc[table["source"] == table["source"].iloc[0], "t_s"]
-    listed = {name: {c: own[c].tolist() for c in own} for name, own in sources.items()}
+    listed = {name: {c: rows[c].tolist() for c in rows} for name, rows in sources.items()}
     return {"loads": {"by": by, "t_s": time.tolist(), "sources": listed}}
 
 
@@ -148,70 +168,66 @@ def _figures(done: list[Validation], out: Path, kind: str) -> list[Path]:
     return [figure for figures in drawn for figure in figures] + harmonics_over_depth(done, out, kind)
 
 
-def _one(
-    case: str, db: str, version: int | None, own: dict[str, Any], left_out: tuple[str, ...], console: Any
-) -> Validation:
+def _one(asked: ValidateOptions, console: Any) -> Validation:
     import ident
-    from ident.validation.validate import show
+    from ident.validation.tables import show
 
+    assert asked.case is not None
     with console.status("flying the case (the first run on a machine compiles: half a minute, in waves two)"):
-        done = ident.validate(case, db, version, without=left_out, **own)
+        done = ident.validate(asked.case, asked.db, asked.version, without=asked.left_out, **asked.of_one_case())
     show(done, console)
     return done
 
 
-def _with_bands(done: list[Validation], samples: int, seed: int, dask: str | None, console: Any) -> list[Validation]:
+def _with_bands(done: list[Validation], asked: ValidateOptions, console: Any) -> list[Validation]:
     """Fly the samples of every case with a progress bar, and print what they say."""
     from rich.progress import Progress
 
-    from ident.validation.bands import show
+    from ident.validation.band_summary import show
     from ident.validation.reliability import show_coverage, show_intervals
 
-    found = []
+    assert asked.samples is not None
+    sampled = []
     with Progress(console=console, transient=True) as progress:
-        task = progress.add_task("flying samples", total=samples * len(done))
+        task = progress.add_task("flying samples", total=asked.samples * len(done))
         for one in done:
-            found.append(one.with_bands(samples, seed, lambda flown: progress.advance(task, flown), dask))
-    for flown in found:
-        result = flown.to_dict()
-        if len(found) == 1:
-            show(result["bands"], console)
-        console.print(f"[bold]{flown.case.name}[/]", highlight=False)
-        show_intervals(result["metrics"], console)
-        show_coverage(result["coverage"], "references", console)
-    return found
+            each = partial(progress.advance, task)
+            sampled.append(one.with_bands(asked.samples, asked.seed, each, asked.dask))
+    for one in sampled:
+        if len(sampled) == 1 and one.band_summary:
+            show(one.band_summary, console)
+        console.print(f"[bold]{one.case.name}[/]", highlight=False)
+        show_intervals(one.metrics, console)
+        show_coverage(one.coverage, "references", console)
+    return sampled
 
 
-def _board_with_bands(
-    board: dict[str, Any], done: list[Validation], out: Path, console: Any, kind: str
-) -> dict[str, Any]:
+def _board_with_bands(board: Scoreboard, done: list[Validation], asked: ValidateOptions, console: Any) -> Scoreboard:
     """The board with bands and coverage case by case and over all references; draws the reliability diagram."""
-    from ident.validation import reliability as reliable
+    from ident.validation.reliability import reliability_figure, show_coverage
 
-    by_name = {one.case.name: one.to_dict() for one in done}
-    keys = ("bands", "coverage", "metrics")
-    cases = [case | {k: by_name[case["case"]][k] for k in keys if case["case"] in by_name} for case in board["cases"]]
-    ranks = [r for one in done if one.bands for r in reliable.ranks(one.bands, one.case, one.reference)]
-    coverage = reliable.mean_shares(case["bands"]["inside"] for case in by_name.values())
-    points = reliable.reliability(ranks)
-    reliable.show_coverage(coverage, "all references", console)
-    if points:
-        path = out / f"reliability_v{board['database']['version']}.{kind}"
-        console.print(f"figure: {reliable.reliability_figure(points, path)}", highlight=False)
-    return board | {"cases": cases, "coverage": coverage, "reliability": points}
+    sampled = board.with_validations(done)
+    show_coverage(sampled.coverage, "all references", console)
+    if sampled.reliability:
+        path = asked.out / f"reliability_v{board.database['version']}.{asked.figures}"
+        console.print(f"figure: {reliability_figure(sampled.reliability, path)}", highlight=False)
+    return sampled
 
 
-def _all(
-    db: str, version: int | None, cases: Path | None, left_out: tuple[str, ...], console: Any
-) -> tuple[list[Validation], dict[str, Any]]:
-    from ident.validation.scoreboard import run_all, show
+def _all(asked: ValidateOptions, console: Any) -> Scoreboard:
+    from ident.validation.scoreboard import run_all
+    from ident.validation.scoreboard_tables import show
 
     with console.status("flying") as status:
-        board, done = run_all(
-            db, version, cases, lambda name: status.update(f"flying {on_screen(name)}"), left_out=left_out
+        board = run_all(
+            asked.db,
+            asked.version,
+            asked.cases,
+            lambda name: status.update(f"flying {on_screen(name)}"),
+            left_out=asked.left_out,
         )
     show(board, console)
-    return done, board
+    return board
 
 
 @click.command()
@@ -317,11 +333,11 @@ def stability(
             raise click.UsageError(f"--{name} is a finite number")
     console = console_for(quiet=json_path == "-")
     with console.status("linearising"):
-        found = ident.stability(case, db, version, speeds, depths)
-    show(found, console)
+        states = ident.stability(case, db, version, speeds, depths)
+    show(states, console)
     if out:
         from ident.analysis.figures import stability_figure
 
-        console.print(f"figure: {on_screen(stability_figure(found, out))}", highlight=False)
+        console.print(f"figure: {on_screen(stability_figure(states, out))}", highlight=False)
     if json_path:
-        emit(found.to_dict(), json_path)
+        emit(states.to_dict(), json_path)

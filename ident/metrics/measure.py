@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 from ident.metrics import in_waves as sea_cases
 from ident.metrics import turning, vertical
 from ident.metrics.in_waves import InWaves
+from ident.metrics.metric import Metric, Metrics, Values
+from ident.metrics.turning import SpiralPoint
 from ident.metrics.zigzag import roll_decay, zigzag
 from sim.flight.case import Case
 from sim.flight.series import Series
@@ -19,24 +21,22 @@ from sim.flight.simulate import Simulation
 
 Array = NDArray[np.float64]
 Channels = dict[str, Array]
-Metrics = dict[str, float | None]
-Columns = dict[str, dict[str, float | None]]
 _DERIVED = ("U", "D0", "s")
 _HORIZONTAL = 1
 
 
 def channels_of(simulation: Simulation) -> Channels:
     """Every channel of a flight, with the end of the run as last sample."""
-    found = {name: simulation[name] for name in (*simulation.columns, *_DERIVED)}
+    channels = {name: simulation[name] for name in (*simulation.columns, *_DERIVED)}
     time, state = simulation.end[0], simulation.end[1:]
-    if time <= found["t"][-1] + 1e-9 or not np.isfinite(state).all():
-        return found
-    last = {name: values[-1] for name, values in found.items()} | {"t": time}
+    if time <= channels["t"][-1] + 1e-9 or not np.isfinite(state).all():
+        return channels
+    last = {name: values[-1] for name, values in channels.items()} | {"t": time}
     last |= dict(zip(simulation.columns[1:13], state, strict=True))
     last["U"] = math.sqrt(float(state[:3] @ state[:3]))
     last["D0"] = last["z"] + simulation.depth_offset
-    last["s"] += math.hypot(last["x"] - found["x"][-1], last["y"] - found["y"][-1])
-    return {name: np.append(values, last[name]) for name, values in found.items()}
+    last["s"] += math.hypot(last["x"] - channels["x"][-1], last["y"] - channels["y"][-1])
+    return {name: np.append(values, last[name]) for name, values in channels.items()}
 
 
 def reference_channels(reference: Series, source: str) -> Channels:
@@ -45,8 +45,8 @@ def reference_channels(reference: Series, source: str) -> Channels:
     if not series:
         return {}
     along = next(iter(series.values())).abscissa
-    found = {name: record.at(along) for name, record in series.items()}
-    return found | {reference.abscissa: along}
+    channels = {name: record.at(along) for name, record in series.items()}
+    return channels | {reference.abscissa: along}
 
 
 def _step_ends(case: Case, simulation: Simulation, key: str) -> list[tuple[float, float]]:
@@ -74,7 +74,7 @@ def _surfaced(case: Case, simulation: Simulation) -> bool:
     return False
 
 
-def _flown_only(case: Case, simulation: Simulation, waves: InWaves) -> tuple[Metrics, list[dict[str, float]] | None]:
+def _flown_only(case: Case, simulation: Simulation, waves: InWaves) -> tuple[Values, list[SpiralPoint] | None]:
     """Metrics that need the programme of the flight, and the curve of a spiral."""
     channels = channels_of(simulation)
     kind = case.maneuver
@@ -113,9 +113,9 @@ def _sources(case: Case) -> list[str]:
     return [*case.reference.compare, *([published] if published else [])]
 
 
-def _transposed(columns: dict[str, Metrics]) -> Columns:
+def _transposed(columns: dict[str, Values]) -> Metrics:
     names = list(dict.fromkeys(name for column in columns.values() for name in column))
-    return {name: {label: column.get(name) for label, column in columns.items()} for name in names}
+    return {name: Metric({label: column.get(name) for label, column in columns.items()}) for name in names}
 
 
 @dataclass(frozen=True)
@@ -124,32 +124,32 @@ class Measured:
 
     Attributes
     ----------
-    metrics : name -> {"simulated", "simulated_as_<source>", each source, "published_model"}.
+    metrics : By name.
     curve : The points of a spiral, or None.
     in_waves : Harmonics or statistics of the flight, which the metrics are from.
     """
 
-    metrics: Columns
-    curve: list[dict[str, float]] | None
+    metrics: Metrics
+    curve: list[SpiralPoint] | None
     in_waves: InWaves
 
 
-def measured(case: Case, simulation: Simulation, reference: Series, own: dict[str, Simulation]) -> Measured:
+def measured(case: Case, simulation: Simulation, reference: Series, as_started: dict[str, Simulation]) -> Measured:
     """Metrics of the flight, of the flights from a source's own start, and of the references.
 
     Parameters
     ----------
     case, simulation, reference : What was flown and what it is held against.
-    own : Flights from the start of a source's record, by source.
+    as_started : Flights from the start of a source's record, by source.
     """
-    flights = {"simulated": simulation} | {f"simulated_as_{k}": v for k, v in own.items()}
+    flights = {"simulated": simulation} | {f"simulated_as_{k}": v for k, v in as_started.items()}
     waves = {label: sea_cases.in_waves(case, flight) for label, flight in flights.items()}
     curve = None
-    columns: dict[str, Metrics]
+    columns: dict[str, Values]
     if case.maneuver == "turning_circle":
         columns = {label: turning.turning_circle(channels_of(flight)) for label, flight in flights.items()}
         if case.waves:
-            columns = {label: found | sea_cases.turn_drift(flights[label]) for label, found in columns.items()}
+            columns = {label: turn | sea_cases.turn_drift(flights[label]) for label, turn in columns.items()}
         for source in _sources(case):
             channels = reference_channels(reference, source)
             if {"x", "y"} <= set(channels):
@@ -157,8 +157,8 @@ def measured(case: Case, simulation: Simulation, reference: Series, own: dict[st
     elif case.maneuver is not None:
         columns = {}
         for label, flight in flights.items():
-            columns[label], found = _flown_only(case, flight, waves[label])
-            curve = found if label == "simulated" else curve
+            columns[label], points = _flown_only(case, flight, waves[label])
+            curve = points if label == "simulated" else curve
     elif case.initial.heel_deg and case.initial.state == "as_given":
         columns = _of_angle(case, reference, flights, "phi", None, lambda t, x, _: roll_decay(t, x))
     elif "zigzag" in (case.command.dV.law, case.command.dH.law):
@@ -178,8 +178,8 @@ def _of_angle(
     flights: dict[str, Simulation],
     angle: str,
     rate: str | None,
-    measure: Callable[[Array, Array, tuple[Array, Array] | None], Metrics],
-) -> dict[str, Metrics]:
+    measure: Callable[[Array, Array, tuple[Array, Array] | None], Values],
+) -> dict[str, Values]:
     """Metrics of one angle, and its rate if there is one, by label."""
     columns = {}
     for label, flight in flights.items():
@@ -193,13 +193,13 @@ def _of_angle(
     return columns
 
 
-def _zigzags(case: Case, reference: Series, flights: dict[str, Simulation]) -> dict[str, Metrics]:
+def _zigzags(case: Case, reference: Series, flights: dict[str, Simulation]) -> dict[str, Values]:
     horizontal = case.command.dH.law == "zigzag"
     command = case.command.dH if horizontal else case.command.dV
     angle, rate, name = ("psi", "r", "yaw") if horizontal else ("theta", "q", "pitch")
     check, sense = math.radians(command.check_deg), 1 if command.first_deg > 0 else -1
 
-    def measure(t: Array, x: Array, turn: tuple[Array, Array] | None) -> Metrics:
+    def measure(t: Array, x: Array, turn: tuple[Array, Array] | None) -> Values:
         return zigzag(t, x, turn, check, sense, name)
 
     columns = _of_angle(case, reference, flights, angle, rate, measure)

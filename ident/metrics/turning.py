@@ -7,6 +7,8 @@ the body origin; the ITTC names midship.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -138,7 +140,21 @@ def _branches(points: list[tuple[float, float]]) -> tuple[Array, Array]:
     return array[: turn + 1][::-1], array[turn:]
 
 
-def direct_spiral(channels: Channels, ends: list[tuple[float, float]]) -> tuple[Metrics, list[dict[str, float]]]:
+@dataclass(frozen=True)
+class SpiralPoint:
+    """A steady point of a spiral.
+
+    Attributes
+    ----------
+    dH_deg : Rudder or horizontal command [deg].
+    r_degps : Yaw rate [deg/s].
+    """
+
+    dH_deg: float
+    r_degps: float
+
+
+def direct_spiral(channels: Channels, ends: list[tuple[float, float]]) -> tuple[Metrics, list[SpiralPoint]]:
     """Steady yaw rate against rudder, and the hysteresis loop.
 
     Parameters
@@ -166,7 +182,7 @@ def direct_spiral(channels: Channels, ends: list[tuple[float, float]]) -> tuple[
     zeros = [_zero(b[:, 0], b[:, 1]) for b in (down, up)]
     found["loop_height_degps"] = _gap(heights)
     found["loop_width_deg"] = _gap(zeros)
-    return found, [{"dH_deg": d, "r_degps": r} for d, r in points]
+    return found, [SpiralPoint(d, r) for d, r in points]
 
 
 def _gap(pair: list[float | None]) -> float | None:
@@ -182,7 +198,7 @@ def _zero(x: Array, y: Array) -> float | None:
     return float(x[i] - y[i] * (x[i + 1] - x[i]) / (y[i + 1] - y[i]))
 
 
-def reverse_spiral(channels: Channels, ends: list[tuple[float, float]]) -> tuple[Metrics, list[dict[str, float]]]:
+def reverse_spiral(channels: Channels, ends: list[tuple[float, float]]) -> tuple[Metrics, list[SpiralPoint]]:
     """Rudder that holds each yaw rate, and the width of the unstable part.
 
     Parameters
@@ -207,7 +223,7 @@ def reverse_spiral(channels: Channels, ends: list[tuple[float, float]]) -> tuple
     low, high = (i - 1, i) if rate[i] != 0.0 or i + 1 >= len(rate) else (i - 1, i + 1)
     found["slope_at_zero_deg_per_degps"] = float((rudder[high] - rudder[low]) / (rate[high] - rate[low]))
     found["loop_width_deg"] = float(np.max(np.maximum.accumulate(rudder) - rudder))
-    return found, [{"dH_deg": d, "r_degps": r} for r, d in points]
+    return found, [SpiralPoint(d, r) for r, d in points]
 
 
 def pull_out(channels: Channels, ends: list[tuple[float, float]]) -> Metrics:

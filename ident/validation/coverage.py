@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,22 +18,37 @@ Array = NDArray[np.float64]
 _COVERAGE_SAMPLES = 200
 
 
+@dataclass(frozen=True)
+class OutsideUse:
+    """Use of a term beyond the data it was identified from.
+
+    Attributes
+    ----------
+    term, axis : Which term, along which axis; ``alpha x beta`` where no run has both angles.
+    fraction_of_time : Share of the flight, 0 to 1.
+    """
+
+    term: str
+    axis: str
+    fraction_of_time: float
+
+
 def _features(simulation: Simulation, model: Model) -> Array:
     """(samples, features) of the kernel at evenly spread samples of a record."""
     chosen = np.unique(np.linspace(0, len(simulation.record) - 1, _COVERAGE_SAMPLES).astype(int))
     # Columns: t, states, controls, the two commands.
     record = np.ascontiguousarray(simulation.record[chosen])
     work = workspace(model)
-    found = np.empty((len(chosen), work.features.size))
-    for row, sample in zip(found, record, strict=True):
+    features = np.empty((len(chosen), work.features.size))
+    for row, sample in zip(features, record, strict=True):
         kernel.features(model, sample[1:13], sample[13:-2], work)
         row[:] = work.features
-    return found
+    return features
 
 
 def outside_tables(
     simulation: Simulation, coefficients: Coefficients, model: Model
-) -> tuple[list[dict[str, Any]], dict[str, list[str]]]:
+) -> tuple[list[OutsideUse], dict[str, list[str]]]:
     """Share of time each term was used beyond its data, and its one-valued axes.
 
     Parameters
@@ -42,12 +57,12 @@ def outside_tables(
 
     Returns
     -------
-    found : ``term``, ``axis`` and ``fraction_of_time``, one entry a term and axis.
+    outside : One entry a term and axis.
     constant : Term -> axes along which it was measured at one value only.
     """
     features = _features(simulation, model)
     planes = [p.name for p in coefficients.vehicle.planes]
-    found: list[dict[str, Any]] = []
+    outside: list[OutsideUse] = []
     constant: dict[str, list[str]] = {}
     for coefficient in coefficients:
         term, table = coefficient.term, coefficient.table
@@ -63,12 +78,12 @@ def outside_tables(
             slack = 1e-9 * max(abs(low), abs(high))
             share = float(np.mean((points[:, k] < low - slack) | (points[:, k] > high + slack)))
             if share > 0.0:
-                found.append({"term": term.name, "axis": axis, "fraction_of_time": share})
-        found += _combined(coefficient, points)
-    return found, constant
+                outside.append(OutsideUse(term.name, axis, share))
+        outside += _combined(coefficient, points)
+    return outside, constant
 
 
-def _combined(coefficient: Coefficient, points: Array) -> list[dict[str, Any]]:
+def _combined(coefficient: Coefficient, points: Array) -> list[OutsideUse]:
     """Share of time at flow angles of which no run has both."""
     axes = coefficient.term.axes
     if not {"alpha", "beta"} <= set(axes) or coefficient.table.measured.all():
@@ -77,4 +92,4 @@ def _combined(coefficient: Coefficient, points: Array) -> list[dict[str, Any]]:
     if len(varied) < 2:
         return []
     share = float(np.mean(coefficient.table.covered(points) < 0.5))
-    return [{"term": coefficient.term.name, "axis": "alpha x beta", "fraction_of_time": share}] if share else []
+    return [OutsideUse(coefficient.term.name, "alpha x beta", share)] if share else []

@@ -208,7 +208,7 @@ def _deflections(done: Validation, planes: list[str], axis: Any) -> None:
 def _spiral(done: Validation, axis: Any) -> None:
     """Steady yaw rate against rudder, in the order flown."""
     curve = done.curve or []
-    rudder, rate = [p["dH_deg"] for p in curve], [p["r_degps"] for p in curve]
+    rudder, rate = [p.dH_deg for p in curve], [p.r_degps for p in curve]
     axis.plot(rudder, rate, color="tab:red", marker="o", ms=4, lw=1.2, label="simulated from the database")
     axis.axhline(0.0, color="k", lw=0.6)
     axis.axvline(0.0, color="k", lw=0.6)
@@ -225,9 +225,10 @@ def _grid(done: Validation, axes: Any) -> None:
     }
     grid = done.grid or []
     for axis, (key, label) in zip(axes, names.items(), strict=True):
-        for depth in sorted({p["depth_m"] for p in grid}):
-            points = [p for p in grid if p["depth_m"] == depth and p[key] is not None]
-            axis.plot([p["speed_mps"] for p in points], [p[key] for p in points], marker="o", label=f"D0 = {depth:g} m")
+        for depth in sorted({p.depth_m for p in grid}):
+            points = [p for p in grid if p.depth_m == depth and getattr(p, key) is not None]
+            speeds, values = [p.speed_mps for p in points], [getattr(p, key) for p in points]
+            axis.plot(speeds, values, marker="o", label=f"D0 = {depth:g} m")
         dress(axis, "speed U [m/s]", label)
     for value in done.case.published:
         axes[0].axhline(

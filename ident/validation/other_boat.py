@@ -203,18 +203,35 @@ def _commanded(case: Case) -> list[str]:
     return found
 
 
-def saturated(simulation: Simulation, case: Case, vehicle: Vehicle) -> list[dict[str, Any]]:
+@dataclass(frozen=True)
+class Saturated:
+    """An actuator that lay at its limit.
+
+    Attributes
+    ----------
+    actuator : A plane, or n.
+    limit, unit : The limit, in its unit.
+    share_of_time : Share of the flight, 0 to 1.
+    """
+
+    actuator: str
+    limit: float
+    unit: str
+    share_of_time: float
+
+
+def saturated(simulation: Simulation, case: Case, vehicle: Vehicle) -> list[Saturated]:
     """Actuators that lay at their limit for part of a flight: which, at what, for what share of the time."""
-    found = []
+    at_limit = []
     for plane in vehicle.planes:
         share = float(np.mean(np.abs(simulation[plane.name]) >= math.radians(plane.limit_deg) - 1e-9))
         if share > 0.0:
-            found.append({"actuator": plane.name, "limit": plane.limit_deg, "unit": "deg", "share_of_time": share})
+            at_limit.append(Saturated(plane.name, plane.limit_deg, "deg", share))
     for limit in case.command.n.limits_rps or vehicle.needed_propeller("a flight").limits.value:
         share = float(np.mean(np.abs(simulation["n"] - limit) <= 1e-9))
         if share > 0.0 and case.command.n.law != "fixed":
-            found.append({"actuator": "n", "limit": float(limit), "unit": "1/s", "share_of_time": share})
-    return found
+            at_limit.append(Saturated("n", float(limit), "1/s", share))
+    return at_limit
 
 
 def check_answers(simulation: Simulation, case: Case, vehicle: Vehicle) -> None:

@@ -8,13 +8,14 @@ Statist. Soc. B 69, calibration). Shares are means over channels, so that a long
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ident.metrics.measure import Columns
+from ident.metrics.metric import Interval, Metric, Metrics
 from ident.validation.bands import LEVELS, Bands
 from sim.flight.case import Case
 from sim.flight.series import Series
@@ -26,7 +27,21 @@ Array = NDArray[np.float64]
 
 # Levels of the reliability diagram.
 _LEVELS = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95)
-QUANTILES = {"q025": 0.025, "q50": 0.5, "q975": 0.975}
+_QUANTILES = (0.025, 0.5, 0.975)
+
+
+@dataclass(frozen=True)
+class Reliability:
+    """A point of the reliability diagram.
+
+    Attributes
+    ----------
+    level : Of a central band, 0 to 1.
+    share : Of the references that lie inside it, 0 to 1.
+    """
+
+    level: float
+    share: float
 
 
 def mean_shares(inside: Iterable[dict[str, Any]]) -> dict[str, float] | None:
@@ -53,9 +68,9 @@ def mean_shares(inside: Iterable[dict[str, Any]]) -> dict[str, float] | None:
 
 def ranks(bands: Bands, case: Case, reference: Series) -> list[Array]:
     """Share of the samples below each point of each reference channel, one array a channel."""
-    found = []
+    below_each = []
     for source in case.reference.compare if case.reference else []:
-        channels = bands.own.get(source, bands.channels)
+        channels = bands.of(source)
         for channel in case.reference.channels if case.reference else []:
             if channel not in reference[source]:
                 continue
@@ -66,66 +81,61 @@ def ranks(bands: Bands, case: Case, reference: Series) -> list[Array]:
             known = np.isfinite(flown)
             below = np.where(known, flown < value, False).sum(axis=0)
             counted = known.sum(axis=0)
-            found.append(below[counted > 0] / counted[counted > 0])
-    return [one for one in found if one.size]
+            below_each.append(below[counted > 0] / counted[counted > 0])
+    return [one for one in below_each if one.size]
 
 
-def reliability(found: Iterable[Array]) -> list[dict[str, float]]:
+def reliability(rank_sets: Iterable[Array]) -> list[Reliability]:
     """Share of references inside the central band of each level.
 
     Parameters
     ----------
-    found : From ``ranks``, of any number of cases.
+    rank_sets : From ``ranks``, of any number of cases.
 
     Returns
     -------
-    ``level`` and ``share``, both 0 to 1; empty without a reference.
+    One point a level; empty without a reference.
     """
-    channels = list(found)
+    channels = list(rank_sets)
     if not channels:
         return []
     return [
-        {"level": level, "share": float(np.mean([np.mean(np.abs(2.0 * r - 1.0) <= level) for r in channels]))}
+        Reliability(level, float(np.mean([np.mean(np.abs(2.0 * r - 1.0) <= level) for r in channels])))
         for level in _LEVELS
     ]
 
 
-def metric_intervals(bands: Bands) -> dict[str, dict[str, float | None]]:
-    """Quantiles of every metric over the samples.
-
-    Returns
-    -------
-    Metric -> ``q025``, ``q50``, ``q975`` over the samples that have it (None where none has), and ``without``, the
-    share of samples that do not come to it.
-    """
+def metric_intervals(bands: Bands) -> dict[str, Interval]:
+    """Quantiles of every metric over the samples."""
     names = list(dict.fromkeys(name for one in bands.metrics for name in one))
-    table: dict[str, dict[str, float | None]] = {}
+    intervals = {}
     for name in names:
         known = np.array([x for x in (one.get(name) for one in bands.metrics) if x is not None], dtype=float)
         known = known[np.isfinite(known)]
-        quantiles = {k: float(np.quantile(known, q)) if known.size else None for k, q in QUANTILES.items()}
-        table[name] = {**quantiles, "without": 1.0 - known.size / len(bands.metrics)}
-    return table
+        quantiles = [float(np.quantile(known, q)) if known.size else None for q in _QUANTILES]
+        intervals[name] = Interval(*quantiles, without=1.0 - known.size / len(bands.metrics))
+    return intervals
 
 
-def with_intervals(metrics: Columns, bands: Bands) -> Columns:
-    """Metrics with the quantiles beside what was simulated, metric by metric."""
-    quantiles = metric_intervals(bands)
-    empty: dict[str, float | None] = {"simulated": None}
-    # A metric that no sample comes to has its quantiles too, unknown.
-    unknown: dict[str, float | None] = dict.fromkeys(QUANTILES) | {"without": 1.0}
-    names = dict.fromkeys([*metrics, *quantiles])
-    return {name: metrics.get(name, empty) | quantiles.get(name, unknown) for name in names}
+def with_intervals(metrics: Metrics, bands: Bands) -> Metrics:
+    """Metrics with the intervals beside what was simulated; one that no sample comes to has an unknown one."""
+    intervals = metric_intervals(bands)
+    unknown = Metric({"simulated": None})
+    return {
+        name: replace(metrics.get(name, unknown), interval=intervals.get(name, Interval()))
+        for name in dict.fromkeys([*metrics, *intervals])
+    }
 
 
-def show_intervals(metrics: dict[str, dict[str, Any]], console: Console) -> None:
+def show_intervals(metrics: Metrics, console: Console) -> None:
     """Print metrics with their intervals."""
     from rich.table import Table
 
     table = Table("metric", "simulated", "2.5 %", "median", "97.5 %", title="Metrics over the samples")
-    for name, values in metrics.items():
-        if "q50" in values:
-            cells = [values.get("simulated"), *[values[k] for k in QUANTILES]]
+    for name, metric in metrics.items():
+        of = metric.interval
+        if of:
+            cells = (metric.simulated, of.q025, of.q50, of.q975)
             table.add_row(name, *["-" if x is None else f"{x:.4g}" for x in cells])
     if table.row_count:
         console.print(table)
@@ -138,14 +148,14 @@ def show_coverage(coverage: dict[str, float] | None, what: str, console: Console
         console.print(f"{what}: {text}", highlight=False)
 
 
-def reliability_figure(points: list[dict[str, float]], path: Path) -> Path:
+def reliability_figure(points: list[Reliability], path: Path) -> Path:
     """Draw the reliability diagram; returns the file."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(4.2, 4.2), layout="constrained")
     ax = figure.subplots()
     ax.plot([0, 1], [0, 1], color="0.6", lw=1, label="as the level promises")
-    ax.plot([p["level"] for p in points], [p["share"] for p in points], "o-", label="references")
+    ax.plot([p.level for p in points], [p.share for p in points], "o-", label="references")
     ax.set(
         xlabel="level of the band", ylabel="share of the references inside", xlim=(0, 1), ylim=(0, 1), aspect="equal"
     )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass, field, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,8 +17,14 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from ident.metrics.in_waves import InWaves
+    from ident.metrics.metric import Metrics
+    from ident.metrics.turning import SpiralPoint
+    from ident.validation.band_summary import BandSummary
     from ident.validation.bands import Bands
     from ident.validation.boats import Boat
+    from ident.validation.coverage import OutsideUse
+    from ident.validation.other_boat import Saturated
+    from ident.validation.sweep import SweepPoint
     from sim.flight.case import Case
     from sim.flight.series import Series
     from sim.flight.simulate import Simulation
@@ -69,16 +76,16 @@ class Validation:
     boat : The vehicle with its coefficients.
     db : Path or URL of the database.
     errors : Source -> channel -> error.
-    metrics : ITTC metric -> ``simulated``, each source and ``published_model`` -> value or None.
+    metrics : ITTC metric -> ``simulated``, each source and ``published_model``, value or None.
     as_started : Flights from the start of a source's own record, by source.
-    outside_tables : ``term``, ``axis`` and ``fraction_of_time`` of every use beyond the data.
+    outside_tables : Every use of a term beyond its data.
     constant_axes : Term -> axes along which it was measured at one value only.
     curve : Points of a spiral; None for other maneuvers.
     grid : Points of a sweep over speed and depth; None without one.
     in_waves : Harmonics or statistics of a flight in waves.
     passed : Whether the run is complete and every tolerance of the case is met.
     bands : Error bands from sampled coefficients; None when none were flown.
-    saturated : Actuators that lay at their limit: ``actuator``, ``limit``, ``unit``, ``share_of_time``.
+    saturated : Actuators that lay at their limit.
     metrics_sigma : Metric -> source -> standard error, of recorded trials.
     notes : What was left out, scaled or limited because another boat flew the case.
 
@@ -102,16 +109,16 @@ class Validation:
     boat: Boat
     db: str
     errors: dict[str, dict[str, ChannelError]]
-    metrics: dict[str, dict[str, float | None]]
+    metrics: Metrics
     as_started: dict[str, Simulation]
-    outside_tables: list[dict[str, Any]]
+    outside_tables: list[OutsideUse]
     constant_axes: dict[str, list[str]]
-    curve: list[dict[str, float]] | None
-    grid: list[dict[str, Any]] | None
+    curve: list[SpiralPoint] | None
+    grid: list[SweepPoint] | None
     in_waves: InWaves
     passed: bool
     bands: Bands | None = None
-    saturated: list[dict[str, Any]] = field(default_factory=list)
+    saturated: list[Saturated] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
     metrics_sigma: dict[str, dict[str, float]] = field(default_factory=dict)
 
@@ -144,6 +151,20 @@ class Validation:
         columns = list(ChannelError.__dataclass_fields__)
         index = pd.MultiIndex.from_tuples(list(rows), names=["source", "channel"]) if rows else None
         return pd.DataFrame(list(rows.values()), index=index, columns=columns)
+
+    @cached_property
+    def band_summary(self) -> BandSummary | None:
+        """What the error bands say: references inside, coefficients that make them wide; None without bands."""
+        from ident.validation.band_summary import summary
+
+        return summary(self.bands, self.case, self.reference) if self.bands else None
+
+    @property
+    def coverage(self) -> dict[str, float] | None:
+        """Level -> mean share of the references inside the band; None without bands or references."""
+        from ident.validation.reliability import mean_shares
+
+        return mean_shares([self.band_summary.inside]) if self.band_summary else None
 
     def with_bands(
         self,
@@ -191,29 +212,25 @@ class Validation:
     def to_dict(self) -> dict[str, Any]:
         """The comparison for a program to read, as ``ident validate --json`` prints it."""
         trim = self.simulation.trim
-        found = {
+        plain = {
             "case": self.case.name,
             "vehicle": self.case.vehicle,
             "database": self.database,
-            "references": {s: {c: e.to_dict() for c, e in found.items()} for s, found in self.errors.items()},
-            "metrics": self.metrics,
-            "outside_tables": self.outside_tables,
-            **({"curve": self.curve} if self.curve else {}),
-            **({"grid": self.grid} if self.grid is not None else {}),
-            "saturated": self.saturated,
+            "references": {s: {c: e.to_dict() for c, e in by.items()} for s, by in self.errors.items()},
+            "metrics": {name: metric.to_dict() for name, metric in self.metrics.items()},
+            "outside_tables": [asdict(use) for use in self.outside_tables],
+            **({"curve": [asdict(point) for point in self.curve]} if self.curve else {}),
+            **({"grid": [asdict(point) for point in self.grid]} if self.grid is not None else {}),
+            "saturated": [asdict(one) for one in self.saturated],
             "notes": self.notes,
             **({"metrics_sigma": self.metrics_sigma} if self.metrics_sigma else {}),
             "trim_limited": list(trim.limited) if trim else [],
             "ends_s": float(self.simulation.end[0]),
             "passed": self.passed,
         }
-        if self.bands is not None:
-            from ident.validation.bands import summary
-            from ident.validation.reliability import mean_shares
-
-            bands = summary(self.bands, self.case, self.reference)
-            found |= {"bands": bands, "coverage": mean_shares([bands["inside"]])}
-        return found
+        if self.band_summary is not None:
+            plain |= {"bands": self.band_summary.to_dict(), "coverage": self.coverage}
+        return plain
 
     def _repr_html_(self) -> str:
         title = f"{self.case.title}, {self.case.vehicle}; {version_words(self.database)}"

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ident.metrics.metric import Metric, Metrics
 from sim.boat.coefficients import Coefficients
 from sim.boat.vehicle import Vehicle
 from sim.flight.case import Case
@@ -21,27 +22,55 @@ if TYPE_CHECKING:
     from ident.validation.bands import Bands
 
 
-def _grid(case: Case, vehicle: Vehicle, model: Model) -> list[dict[str, Any]]:
-    """Self-propulsion at every speed and depth of a sweep; ``reason`` where there is none."""
-    found: list[dict[str, Any]] = []
-    names = ("n_rps", "pitch_deg", "heel_deg", "dV_deg", "dH_deg", "ballast_kg", "trim_tank_m")
+@dataclass(frozen=True)
+class SweepPoint:
+    """Self-propulsion at one speed and depth of a sweep; None where there is none.
+
+    Attributes
+    ----------
+    speed_mps, depth_m : U [m/s], D0 [m].
+    n_rps : Revolutions [1/s].
+    pitch_deg, heel_deg : theta, phi [deg].
+    dV_deg, dH_deg : Commands [deg].
+    ballast_kg, trim_tank_m : Ballast [kg], shift of the centre of gravity [m].
+    limited : Actuators at their limit.
+    reason : Why there is none.
+    """
+
+    speed_mps: float
+    depth_m: float
+    n_rps: float | None = None
+    pitch_deg: float | None = None
+    heel_deg: float | None = None
+    dV_deg: float | None = None
+    dH_deg: float | None = None
+    ballast_kg: float | None = None
+    trim_tank_m: float | None = None
+    limited: list[str] = field(default_factory=list)
+    reason: str | None = None
+
+
+def _solved(case: Case, vehicle: Vehicle, model: Model, speed: float, depth: float) -> SweepPoint:
+    initial = case.initial.model_copy(update={"speed_mps": speed, "depth_m": depth})
+    try:
+        _, controls, trim = initial_state(case.model_copy(update={"initial": initial}), vehicle, model)
+    except NoEquilibrium as error:
+        return SweepPoint(speed, depth, reason=str(error))
+    assert trim is not None
+    tanks = controls[len(vehicle.planes) + 1 :]
+    angles = np.degrees([trim.state[10], trim.state[9], trim.dV, trim.dH])
+    values = [controls[len(vehicle.planes)], *angles, *(tanks if len(tanks) else (0.0, 0.0))]
+    return SweepPoint(speed, depth, *map(float, values), limited=list(trim.limited))
+
+
+def _named(point: SweepPoint) -> str:
+    return f"n_rps_{point.speed_mps:.4g}mps_{point.depth_m:g}m"
+
+
+def _grid(case: Case, vehicle: Vehicle, model: Model) -> list[SweepPoint]:
+    """Self-propulsion at every speed and depth of a sweep."""
     assert case.sweep is not None
-    for speed in case.sweep.speed_mps:
-        for depth in case.sweep.depth_m:
-            initial = case.initial.model_copy(update={"speed_mps": speed, "depth_m": depth})
-            entry: dict[str, Any] = {"speed_mps": speed, "depth_m": depth} | dict.fromkeys(names)
-            try:
-                _, controls, trim = initial_state(case.model_copy(update={"initial": initial}), vehicle, model)
-            except NoEquilibrium as error:
-                found.append(entry | {"limited": [], "reason": str(error)})
-                continue
-            assert trim is not None
-            tanks = controls[len(vehicle.planes) + 1 :]
-            angles = np.degrees([trim.state[10], trim.state[9], trim.dV, trim.dH])
-            values = [controls[len(vehicle.planes)], *angles, *(tanks if len(tanks) else (0.0, 0.0))]
-            entry |= {k: float(v) for k, v in zip(names, values, strict=True)}
-            found.append(entry | {"limited": list(trim.limited), "reason": None})
-    return found
+    return [_solved(case, vehicle, model, u, d) for u in case.sweep.speed_mps for d in case.sweep.depth_m]
 
 
 def sampled_grid(case: Case, vehicle: Vehicle, rows: pd.DataFrame, bands: Bands) -> Bands:
@@ -55,21 +84,21 @@ def sampled_grid(case: Case, vehicle: Vehicle, rows: pd.DataFrame, bands: Bands)
     if case.sweep is None:
         return bands
     assembly = Assembly(Coefficients(vehicle, rows), environment_of(case))
-    found = []
-    for own, values in zip(bands.metrics, bands.values(rows), strict=True):
-        metrics: dict[str, Any] = {}
-        with_grid(case, vehicle, equipped(case, vehicle, assembly.model(values)), metrics)
-        found.append(dict(own) | {name: columns["simulated"] for name, columns in metrics.items()})
-    return replace(bands, metrics=tuple(found))
+    metrics = []
+    for of_sample, values in zip(bands.metrics, bands.values(rows), strict=True):
+        grid = _grid(case, vehicle, equipped(case, vehicle, assembly.model(values)))
+        metrics.append(dict(of_sample) | {_named(point): point.n_rps for point in grid})
+    return replace(bands, metrics=tuple(metrics))
 
 
-def with_grid(case: Case, vehicle: Vehicle, model: Model, metrics: dict[str, Any]) -> dict[str, Any]:
-    """The grid of a sweep for the result; its revolutions are added to ``metrics``."""
+def with_grid(case: Case, vehicle: Vehicle, model: Model, metrics: Metrics) -> tuple[list[SweepPoint] | None, Metrics]:
+    """The grid of a sweep, None without one, and the metrics with its revolutions."""
     if case.sweep is None:
-        return {}
+        return None, metrics
     grid = _grid(case, vehicle, model)
-    labels = {label: None for columns in metrics.values() for label in columns} | {"simulated": None}
+    labels = {label: None for metric in metrics.values() for label in metric} | {"simulated": None}
+    solved = {}
     for point in grid:
-        name = f"n_rps_{point['speed_mps']:.4g}mps_{point['depth_m']:g}m"
-        metrics[name] = labels | metrics.get(name, {}) | {"simulated": point["n_rps"]}
-    return {"grid": grid}
+        known = metrics[_named(point)].columns if _named(point) in metrics else {}
+        solved[_named(point)] = Metric(labels | known | {"simulated": point.n_rps})
+    return grid, metrics | solved

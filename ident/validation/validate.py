@@ -5,13 +5,13 @@ from __future__ import annotations
 import os
 from collections.abc import Collection
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ident.metrics.measure import measured
-from ident.text import on_screen
+from ident.metrics.metric import Metrics
 from ident.trials.spec import load_spec
 from ident.validation.boats import Boat, Fleet
 from ident.validation.coverage import outside_tables
@@ -20,7 +20,6 @@ from ident.validation.references import beyond_the_run, check_reference, compare
 from ident.validation.result import ChannelError, Validation
 from ident.validation.sweep import with_grid
 from ident.validation.trial_reference import DRIVEN, TRIAL, Referenced, referenced, smoothed, with_trial
-from sim.boat.database import axis_columns, version_words
 from sim.boat.vehicle import Vehicle, load_vehicle
 from sim.files.errors import InputError
 from sim.files.record import Record
@@ -30,9 +29,6 @@ from sim.flight.reference import Reference
 from sim.flight.reference_table import is_series
 from sim.flight.series import Series, read_series
 from sim.flight.simulate import CHANNELS, Simulation, fly
-
-if TYPE_CHECKING:
-    from rich.console import Console
 
 Array = NDArray[np.float64]
 _FRAMES = {
@@ -67,10 +63,10 @@ def _error(
     record = reference[source][channel]
     along, (value, unit, _) = record.abscissa, record.shown
     flown = compared(along, simulation, reference.abscissa, f"reference {source} {channel}")
-    found = rmse(simulation, channel, record.kept(flown), reference.abscissa)
+    error = rmse(simulation, channel, record.kept(flown), reference.abscissa)
     scatter = record.kept(flown).rms_sigma
     other = _published_rmse(along, value, flown, _published(published, channel, unit)) if channel in published else None
-    return ChannelError(found, unit, int(flown.sum()), other, found / other if other else None, scatter)
+    return ChannelError(error, unit, int(flown.sum()), other, error / other if other else None, scatter)
 
 
 def _published_rmse(
@@ -95,45 +91,45 @@ def flights(case: Case, boat: Boat) -> tuple[Simulation, dict[str, Simulation]]:
     """
     model, water = boat.model(case), boat.water(case)
     started = {s: case.started_as(s) for s in (case.reference.compare if case.reference else [])}
-    own = {s: fly(c, boat.vehicle, model, water) for s, c in started.items() if c is not None}
-    return fly(case, boat.vehicle, model, water), own
+    as_started = {s: fly(c, boat.vehicle, model, water) for s, c in started.items() if c is not None}
+    return fly(case, boat.vehicle, model, water), as_started
 
 
 def errors(
-    case: Case, reference: Series, simulation: Simulation, own: dict[str, Simulation]
+    case: Case, reference: Series, simulation: Simulation, as_started: dict[str, Simulation]
 ) -> dict[str, dict[str, ChannelError]]:
     """Errors by source and channel.
 
     Parameters
     ----------
     case, reference : What was flown, and what it is held against.
-    simulation, own : From ``flights``.
+    simulation, as_started : From ``flights``.
 
     Raises
     ------
     InputError
         As ``compared``.
     """
-    found: dict[str, dict[str, ChannelError]] = {}
+    by_source: dict[str, dict[str, ChannelError]] = {}
     if case.reference is None:
-        return found
+        return by_source
     published = reference[case.reference.published_model or ""]
-    flown = {source: own.get(source, simulation) for source in case.reference.compare}
-    if DRIVEN in own:
-        flown[DRIVEN] = own[DRIVEN]
+    flown = {source: as_started.get(source, simulation) for source in case.reference.compare}
+    if DRIVEN in as_started:
+        flown[DRIVEN] = as_started[DRIVEN]
     for label, flight in flown.items():
         source = TRIAL if label == DRIVEN else label
-        found[label] = {
+        by_source[label] = {
             channel: _error(flight, reference, source, channel, published)
             for channel in case.reference.channels
             if channel in reference[source]
         }
-    return found
+    return by_source
 
 
-def _passed(case: Case, found: dict[str, dict[str, ChannelError]]) -> bool:
+def _passed(case: Case, by_source: dict[str, dict[str, ChannelError]]) -> bool:
     for tolerance in case.tolerance:
-        entry = found.get(tolerance.source, {}).get(tolerance.channel)
+        entry = by_source.get(tolerance.source, {}).get(tolerance.channel)
         if entry is None or entry.unit != tolerance.unit:
             raise InputError(
                 f"case {case.name}, tolerance on {tolerance.source} {tolerance.channel} [{tolerance.unit}]",
@@ -171,8 +167,8 @@ def _with_reference(case: Case, path: Path, frame: str | None, trial: str | os.P
     compare = [s for s in series.data if s != model]
     channels = [c for c in CHANNELS if any(c in series[s] for s in compare)]
     if not channels:
-        found = ", ".join(sorted({c for s in series.data.values() for c in s})) or "no row"
-        raise InputError(f"{path}, column channel", found, ", ".join(CHANNELS))
+        present = ", ".join(sorted({c for s in series.data.values() for c in s})) or "no row"
+        raise InputError(f"{path}, column channel", present, ", ".join(CHANNELS))
     reference = Reference(
         file=str(path),
         published_model=model if model in series.data else None,
@@ -244,10 +240,9 @@ def validate(
     measures = measured(flown, simulation, held.series, as_started)
     _check_numbers(measures.metrics, where)
     model = boat.model(flown)
-    # Adds its revolutions to the metrics.
-    grid = with_grid(flown, ship, model, measures.metrics)
+    grid, metrics = with_grid(flown, ship, model, measures.metrics)
     outside, constant = outside_tables(simulation, boat.coefficients, model)
-    met = _passed(flown, channel_errors) and _published_met(flown, measures.metrics)
+    met = _passed(flown, channel_errors) and _published_met(flown, metrics)
     return Validation(
         case=flown,
         simulation=simulation,
@@ -255,17 +250,17 @@ def validate(
         boat=boat,
         db=os.fspath(db),
         errors=channel_errors,
-        metrics=measures.metrics,
+        metrics=metrics,
         as_started=as_started,
         outside_tables=outside,
         constant_axes=constant,
         curve=measures.curve,
-        grid=grid.get("grid"),
+        grid=grid,
         in_waves=measures.in_waves,
-        passed=bool(_complete(simulation) and met),
+        passed=bool(np.isfinite(simulation.end).all() and met),
         saturated=saturated(simulation, flown, ship),
         notes=[*notes, *beyond_the_run(flown, held.series, simulation, as_started)],
-        metrics_sigma={k: v for k, v in held.sigma.items() if k in measures.metrics},
+        metrics_sigma={k: v for k, v in held.sigma.items() if k in metrics},
     )
 
 
@@ -302,108 +297,21 @@ def _every_flight(held: Referenced, boat: Boat, where: str) -> tuple[Simulation,
     return simulation, as_started
 
 
-def _check_numbers(metrics: dict[str, Any], where: str) -> None:
+def _check_numbers(metrics: Metrics, where: str) -> None:
     """Refuse metrics that are no numbers. Raises ``InputError`` naming the first."""
-    for name, columns in metrics.items():
-        for value in columns.values():
+    for name, metric in metrics.items():
+        for value in metric.values():
             if value is not None and not np.isfinite(value):
                 text = f"metric {name} is {value}"
                 raise InputError(where, text, "a maneuver that the metrics of its kind are defined for")
 
 
-def _complete(simulation: Simulation) -> bool:
-    """Whether the run went to its duration, or to an event that ends it, in finite numbers."""
-    return bool(np.isfinite(simulation.end).all())
-
-
-def _published_met(case: Case, metrics: dict[str, Any]) -> bool:
+def _published_met(case: Case, metrics: Metrics) -> bool:
     """Whether every published value with a tolerance is met."""
     for value in case.published:
         if value.tolerance is None:
             continue
-        found = metrics.get(value.metric, {}).get("simulated")
-        if found is None or abs(found - value.value) > value.tolerance * abs(value.value):
+        simulated = metrics[value.metric].simulated if value.metric in metrics else None
+        if simulated is None or abs(simulated - value.value) > value.tolerance * abs(value.value):
             return False
     return True
-
-
-def _number(value: float | None, digits: int = 4) -> str:
-    return "-" if value is None else f"{value:.{digits}g}"
-
-
-def show(done: Validation, console: Console) -> None:
-    """Print errors, metrics and use beyond the data as tables."""
-    from rich.table import Table
-
-    console.print(f"[bold]{on_screen(done.case.title)}[/], {version_words(done.database)}")
-    if done.errors:
-        table = Table("reference", "channel", "RMSE", "published model", "ratio", "unit", title="Errors")
-        for source, channels in done.errors.items():
-            for channel, e in channels.items():
-                text = "-" if e.ratio is None else f"[{'green' if e.ratio <= 1 else 'red'}]{e.ratio:.2f}[/]"
-                numbers = [_number(e.rmse), _number(e.published_model_rmse)]
-                table.add_row(on_screen(source), channel, *numbers, text, on_screen(e.unit))
-        console.print(table)
-    if done.metrics:
-        labels = list(next(iter(done.metrics.values())))
-        table = Table("metric", *map(on_screen, labels), title="Metrics (ITTC)")
-        for metric, values in done.metrics.items():
-            table.add_row(on_screen(metric), *[_number(values[c]) for c in labels])
-        console.print(table)
-    _show_grid(done.grid or [], console)
-    _show_outside(done, console)
-    for note in done.notes:
-        console.print(note, highlight=False)
-    for one in done.saturated:
-        share = f"{100.0 * one['share_of_time']:.0f} % of the time"
-        console.print(f"[red]{one['actuator']}: at the limit of {one['limit']:g} {one['unit']} for {share}[/]")
-    limited = done.simulation.trim.limited if done.simulation.trim else ()
-    if limited:
-        console.print(f"[red]at the start at their limit: {', '.join(limited)}[/]")
-    end = float(done.simulation["t"][-1])
-    if not _complete(done.simulation):
-        console.print(f"[red]the simulation left the finite numbers after {end:.1f} s; errors are up to there[/]")
-    elif end < done.case.run.duration_s - done.case.run.record_s:
-        console.print(f"the run ended at {done.simulation.end[0]:.1f} s by an event of the case", highlight=False)
-    if float(done.simulation["D0"].min()) < 0.0:
-        console.print("[red]the sail top left the water; the model holds for a fully submerged boat only[/]")
-    if not done.case.tolerance and all(p.tolerance is None for p in done.case.published):
-        console.print("the case states no tolerance")
-    else:
-        verdict = "[green]within[/]" if done.passed else "[red]outside[/]"
-        console.print(f"{verdict} the tolerances of the case file")
-
-
-def _show_grid(grid: list[dict[str, Any]], console: Console) -> None:
-    from rich.table import Table
-
-    if not grid:
-        return
-    keys = ("speed_mps", "depth_m", "n_rps", "pitch_deg", "heel_deg", "dV_deg", "dH_deg", "ballast_kg", "trim_tank_m")
-    table = Table(*keys, "remark", title="Self-propulsion")
-    for point in grid:
-        remark = point["reason"] or ", ".join(f"{k} at its limit" for k in point["limited"])
-        table.add_row(*[_number(point[k]) for k in keys], remark)
-    console.print(table)
-
-
-def _show_outside(done: Validation, console: Console) -> None:
-    from rich.table import Table
-
-    units = {axis: column for column, axis in axis_columns().items()}
-    rows: dict[tuple[str, float], list[str]] = {}
-    for item in done.outside_tables:
-        rows.setdefault((item["axis"], round(item["fraction_of_time"], 3)), []).append(item["term"])
-    if rows:
-        table = Table("axis", "share of time", "terms", title="Used outside their data")
-        for (axis, share), terms in sorted(rows.items(), key=lambda r: -r[0][1]):
-            table.add_row(units.get(axis, axis), f"{100 * share:.1f} %", " ".join(terms))
-        console.print(table)
-    single: dict[str, list[str]] = {}
-    for term, axes in done.constant_axes.items():
-        for axis in axes:
-            single.setdefault(axis, []).append(term)
-    for axis, terms in single.items():
-        console.print(
-            f"measured at one {units.get(axis, axis)} only, used at every other: {' '.join(terms)}", highlight=False
-        )
