@@ -14,7 +14,8 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from ident.analysis.stability import Linear, Stability, StabilityMap, stability
+    from ident.analysis.result import Linear, Stability, StabilityMap
+    from ident.analysis.stability import stability
     from ident.calibration.result import Calibrated
     from ident.calibration.version import calibrate
     from ident.captive.campaign import Campaign, read_campaign
@@ -66,9 +67,9 @@ _PLACES = {
     "Validation": "ident.validation.result",
     "ChannelError": "ident.validation.result",
     "Simulation": "sim.flight.simulate",
-    "StabilityMap": "ident.analysis.stability",
-    "Stability": "ident.analysis.stability",
-    "Linear": "ident.analysis.stability",
+    "StabilityMap": "ident.analysis.result",
+    "Stability": "ident.analysis.result",
+    "Linear": "ident.analysis.result",
     "Results": "ident.output",
     "InputError": "sim.files.errors",
     "NoEquilibrium": "sim.flight.trim",

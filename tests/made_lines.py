@@ -59,9 +59,7 @@ uncertainty = { floor = 0.02, source = "made" }
 quality = { made = { factor = 1.0, meaning = "made" } }
 """
 
-FACILITY = """
-name = "solver"
-exclude = ["pure_rotation", "drift_vertical", "propeller_side_force"]
+_TOWED = """
 [towing]
 speed_mps = [2.0]
 depth_m = [40.0]
@@ -69,20 +67,37 @@ depth_m = [40.0]
 speed_mps = [2.0]
 depth_m = [40.0]
 beta_deg = [6.0]
+[rotating_arm]
+speed_mps = [2.0]
+depth_m = [40.0]
+r_radps = [0.15]
+"""
+
+
+def facility(exclude: str, linear: float, angular: float) -> str:
+    """A facility file: towing, drift, rotation and accelerations [m/s^2, rad/s^2] at one speed and depth."""
+    return f"""
+name = "solver"
+exclude = {exclude}
+{_TOWED}
+[acceleration]
+depth_m = [40.0]
+linear_mps2 = [{linear}]
+angular_radps2 = [{angular}]
+"""
+
+
+FACILITY = (
+    facility('["pure_rotation", "drift_vertical", "propeller_side_force"]', 0.5, 0.2).replace(
+        "r_radps = [0.15]", "beta_deg = [6.0]\nr_radps = [0.15]"
+    )
+    + """
 [plane_deflection]
 speed_mps = [2.0]
 depth_m = [40.0]
 plane_deg = [10.0]
-[rotating_arm]
-speed_mps = [2.0]
-depth_m = [40.0]
-beta_deg = [6.0]
-r_radps = [0.15]
-[acceleration]
-depth_m = [40.0]
-linear_mps2 = [0.5]
-angular_radps2 = [0.2]
 """
+)
 
 # The surface is drawn in millimetres at a scale of 1:2, x aft from the nose, z up.
 TEMPLATE = """
@@ -140,16 +155,21 @@ def write_stl(path: Path, parts: dict[str, trimesh.Trimesh]) -> None:
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
-def write_files(folder: Path) -> Path:
-    """Vehicle, campaign without runs, facility, template and surface."""
+def write_texts(folder: Path, vehicle: str = VEHICLE, test_rig: str = FACILITY, template: str = TEMPLATE) -> None:
+    """Vehicle, campaign without runs, facility and template."""
     (folder / "captive").mkdir(parents=True)
     for name, text in (
-        ("spheroid.toml", VEHICLE),
+        ("spheroid.toml", vehicle),
         ("captive/campaign.toml", CAMPAIGN),
-        ("facility.toml", FACILITY),
-        ("template.toml", TEMPLATE),
+        ("facility.toml", test_rig),
+        ("template.toml", template),
     ):
         (folder / name).write_text(text, encoding="utf-8")
+
+
+def write_files(folder: Path) -> Path:
+    """The texts and the surface."""
+    write_texts(folder)
     write_stl(folder / "hull.stl", surfaces())
     return folder
 

@@ -13,32 +13,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
-from made_lines import CAMPAIGN, TEMPLATE, VEHICLE, write_stl
+from made_lines import TEMPLATE, VEHICLE, facility, write_stl, write_texts
 
 import ident
 from ident.captive.campaign import read_campaign
 from ident.cfd.matrix import read_matrix
 from ident.identification.identify import identify
-
-FACILITY = """
-name = "solver"
-exclude = ["pure_rotation", "drift_vertical"]
-[towing]
-speed_mps = [2.0]
-depth_m = [40.0]
-[drift_horizontal]
-speed_mps = [2.0]
-depth_m = [40.0]
-beta_deg = [6.0]
-[rotating_arm]
-speed_mps = [2.0]
-depth_m = [40.0]
-r_radps = [0.15]
-[acceleration]
-depth_m = [40.0]
-linear_mps2 = [1.0]
-angular_radps2 = [0.5]
-"""
 
 
 def lamb(a: float, b: float) -> tuple[float, float, float]:
@@ -66,14 +46,8 @@ def write_spheroid(folder: Path) -> None:
     template += (
         "[grid]\ncells_per_length = 90\nlevels = 4\nextent = 2.0\nrefinement = 1.25\n[steady]\niterations = 250\n"
     )
-    (folder / "captive").mkdir(parents=True)
-    for name, text in (
-        ("spheroid.toml", vehicle),
-        ("captive/campaign.toml", CAMPAIGN),
-        ("facility.toml", FACILITY),
-        ("template.toml", template),
-    ):
-        (folder / name).write_text(text, encoding="utf-8")
+    rig = facility('["pure_rotation", "drift_vertical"]', 1.0, 0.5)
+    write_texts(folder, vehicle, rig, template)
     hull = trimesh.creation.icosphere(subdivisions=4)
     hull.apply_scale([2.0, 0.4, 0.4])
     write_stl(folder / "hull.stl", {"hull": hull})

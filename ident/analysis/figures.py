@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from ident.analysis.stability import Linear, Stability, StabilityMap
+    from ident.analysis.result import Linear, Stability, StabilityMap
 
 Array = NDArray[np.float64]
 _ENDINGS = (".png", ".svg", ".pdf")

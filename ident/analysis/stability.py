@@ -4,18 +4,16 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ident.analysis.derivatives import loads, prime_scale, slope, steps
-from ident.analysis.state_space import StateSpaceModel, rate_change, state_space
-from ident.output import html_table
-from ident.text import on_screen
+from ident.analysis.result import Linear, Stability, StabilityMap
+from ident.analysis.state_space import rate_change, state_space
 from sim.boat.catalogue import OUTPUTS, STATES
 from sim.boat.coefficients import Coefficients
 from sim.boat.database import read_rows
@@ -28,11 +26,6 @@ from sim.flight.trim import NoEquilibrium, self_propulsion
 from sim.kernel.assemble import assemble
 from sim.kernel.layout import Model
 
-if TYPE_CHECKING:
-    import pandas as pd
-    from control import StateSpace
-    from rich.console import Console
-
 Array = NDArray[np.float64]
 # States of the linearised boat: positions x, y and heading are neutral and left out.
 _VERTICAL = (0, 2, 4, 8, 10)
@@ -42,157 +35,6 @@ _VERTICAL_INERTIA, _HORIZONTAL_INERTIA = (2, 4), (1, 5)
 _PLANES = ("vertical", "horizontal")
 _TABLE_STEP = 1e-4
 _DEFLECTION = math.radians(1.0)
-_TABLED = (
-    *("speed", "depth", "g_vertical", "g_horizontal", "neutral_point_vertical", "neutral_point_horizontal"),
-    *("critical_speed_stern", "critical_speed_sail"),
-)
-
-
-@dataclass(frozen=True)
-class Linear:
-    """x' = A x + b c of small changes x from a steady state, and c from the command that holds it.
-
-    Attributes
-    ----------
-    states : Names of x; m/s, rad/s, m and rad, x forward, y starboard, z down.
-    command : dV or dH [rad], through the mixer; without the delay of the actuators.
-    a, b : (n, n) and (n,).
-    about : (n,) values of the states that x are the changes from.
-
-    Examples
-    --------
-    >>> import ident
-    >>> (state,) = ident.stability("my-boat/zigzag.toml", db="coeff_db", speeds=[5.0], depths=[40.0])
-    >>> linear = state.linear["horizontal"]
-    >>> linear.states, linear.command
-    (('v', 'p', 'r', 'phi'), 'dH')
-    """
-
-    states: tuple[str, ...]
-    command: str
-    a: list[list[float]]
-    b: list[float]
-    about: list[float]
-
-
-@dataclass(frozen=True)
-class Stability:
-    """Stability of straight level motion at one speed and depth.
-
-    Attributes
-    ----------
-    speed, depth : U [m/s], D0 [m].
-    g_vertical, g_horizontal : Stability indices Gv, Gh; positive is stable. None when the
-        derivatives of that plane of motion are absent.
-    neutral_point_vertical, neutral_point_horizontal : Where a cross force gives no turn,
-        x of the neutral point over L, positive ahead of the origin; None as above.
-    critical_speed_stern, critical_speed_sail : Speed [m/s] at which the planes no longer
-        change the depth (reversal speed), by group; None when there is none.
-    vertical, horizontal : Eigenvalues [1/s] of the motion about ``about``, real and imaginary
-        part, least stable first; empty when there is no such state, or no added mass of
-        that plane of motion.
-    linear : The linear models these are of, vertical and horizontal, as far as there are any.
-    about : ``self-propulsion``, or ``speed held``: straight and level with the planes at
-        zero and without surge, for a vehicle without propulsion data.
-
-    Examples
-    --------
-    >>> import ident
-    >>> (state,) = ident.stability("my-boat/zigzag.toml", db="coeff_db", speeds=[5.0], depths=[40.0])
-    >>> state.g_horizontal > 0.0, state.about
-    (True, 'self-propulsion')
-    """
-
-    speed: float
-    depth: float
-    g_vertical: float | None
-    g_horizontal: float | None
-    neutral_point_vertical: float | None
-    neutral_point_horizontal: float | None
-    critical_speed_stern: float | None
-    critical_speed_sail: float | None
-    vertical: list[tuple[float, float]]
-    horizontal: list[tuple[float, float]]
-    linear: dict[str, Linear]
-    about: str
-    _whole: Callable[[], StateSpaceModel] | None = field(default=None, repr=False, compare=False)
-
-    def to_dict(self) -> dict[str, Any]:
-        """Plain data; eigenvalues as (real, imaginary), linear models as states, command, a, b, about."""
-        found = asdict(replace(self, _whole=None))
-        del found["_whole"]
-        return found
-
-    def state_space(self) -> StateSpaceModel:
-        """The boat as one linear system with all its states, actuators and inputs, about self-propulsion.
-
-        Raises
-        ------
-        InputError
-            Where there is no self-propulsion.
-        """
-        if self._whole is None:
-            raise InputError("stability, state space", "a state on its own", "one of ident.stability(...)")
-        return self._whole()
-
-    def to_ss(self) -> StateSpace:
-        """The same for python-control (extra ``control``): A, B, C, D with names."""
-        return self.state_space().to_ss()
-
-
-@dataclass(frozen=True)
-class StabilityMap:
-    """Stability of straight level motion over speeds and depths.
-
-    Attributes
-    ----------
-    title : The vehicle's.
-    version : Of the database.
-    states : Depth by depth.
-
-    Examples
-    --------
-    >>> import ident
-    >>> found = ident.stability("my-boat/zigzag.toml", db="coeff_db", speeds=[3.0, 5.0], depths=[40.0])
-    >>> found.table[["speed", "depth"]].values.tolist()
-    [[3.0, 40.0], [5.0, 40.0]]
-    """
-
-    title: str
-    version: int
-    states: tuple[Stability, ...]
-
-    def __len__(self) -> int:
-        return len(self.states)
-
-    def __iter__(self) -> Iterator[Stability]:
-        return iter(self.states)
-
-    @property
-    def table(self) -> pd.DataFrame:
-        """One row a state: speed, depth, indices, neutral points, critical speeds."""
-        import pandas as pd
-
-        return pd.DataFrame([{k: getattr(s, k) for k in _TABLED} for s in self.states], columns=list(_TABLED))
-
-    def to_ss(self) -> StateSpace | tuple[StateSpace, ...]:
-        """``to_ss()`` of the state, or of each in their order where there are several.
-
-        Raises
-        ------
-        InputError
-            Where there is no self-propulsion.
-        """
-        found = tuple(s.to_ss() for s in self.states)
-        return found[0] if len(found) == 1 else found
-
-    def to_dict(self) -> list[dict[str, Any]]:
-        """``to_dict()`` of every state."""
-        return [s.to_dict() for s in self.states]
-
-    def _repr_html_(self) -> str:
-        rows = [["-" if x is None else f"{x:.4g}" for x in row] for row in self.table.itertuples(index=False)]
-        return html_table(f"{self.title}, database version {self.version}", _TABLED, rows)
 
 
 def stability_index(force: float, moment: float, force_rate: float, moment_rate: float, mass: float) -> float:
@@ -283,11 +125,11 @@ def _linear_models(
             return {}, about
         state, controls = trim.state, trim.controls
     added = np.diag(added_mass_matrix(coefficients, environment))
-    found = {}
+    models = {}
     for name, inertia, states in zip(_PLANES, (_VERTICAL_INERTIA, _HORIZONTAL_INERTIA), kept, strict=True):
         if (added[list(inertia)] > 0.0).all():
-            found[name] = _linear(model, vehicle, state, controls, states, step)
-    return found, about
+            models[name] = _linear(model, vehicle, state, controls, states, step)
+    return models, about
 
 
 def stability_at(coefficients: Coefficients, environment: Environment, speed: float, depth: float) -> Stability:
@@ -326,8 +168,8 @@ def stability_at(coefficients: Coefficients, environment: Environment, speed: fl
 
     def index(motions: str, outputs: str, inertia: float) -> float | None:
         force, moment, force_rate, moment_rate = (prime(f"{o}_{m}") for m in motions for o in outputs)
-        found = stability_index(force, moment, force_rate, moment_rate, inertia)
-        return found if math.isfinite(found) else None
+        value = stability_index(force, moment, force_rate, moment_rate, inertia)
+        return value if math.isfinite(value) else None
 
     def neutral_point(output: str, by: str, sign: float) -> float | None:
         force = prime(f"{output[0]}_{by}")
@@ -395,8 +237,8 @@ def stability(
     Examples
     --------
     >>> import ident
-    >>> found = ident.stability("my-boat/zigzag.toml", db="coeff_db", speeds=[5.0], depths=[40.0])
-    >>> [state.linear["vertical"].command for state in found]
+    >>> states = ident.stability("my-boat/zigzag.toml", db="coeff_db", speeds=[5.0], depths=[40.0])
+    >>> [state.linear["vertical"].command for state in states]
     ['dV']
     """
     data, where = load_case(os.fspath(case))
@@ -412,41 +254,9 @@ def stability(
     depths = depths or tuple(sorted(drift["depth_m"].dropna().unique())) or (data.initial.depth_m,)
     coefficients = Coefficients(vehicle, rows)
     environment = _the_same_at_every_depth(data)
-    found = []
+    states = []
     for depth in depths:
         for speed in speeds:
             whole = partial(state_space, coefficients, environment, speed, depth, data.run.step_s)
-            found.append(replace(stability_at(coefficients, environment, speed, depth), _whole=whole))
-    return StabilityMap(vehicle.title, number, tuple(found))
-
-
-def show(found: StabilityMap, console: Console) -> None:
-    """Print the results as a table."""
-    from rich.table import Table
-
-    table = Table(
-        *("U [m/s]", "D0 [m]", "Gv", "Gh", "neutral point v, h [L]", "critical speed stern, sail [m/s]"),
-        *("vertical [1/s]", "horizontal [1/s]"),
-        title=on_screen(f"{found.title}, database version {found.version}"),
-    )
-
-    def speed(value: float | None) -> str:
-        return "none" if value is None else f"{value:.2f}"
-
-    def root(values: list[tuple[float, float]]) -> str:
-        if not values:
-            return "-"
-        real, imaginary = values[0]
-        return f"{real:+.4f}" + (f" +-{abs(imaginary):.4f}i" if imaginary else "")
-
-    def number(value: float | None) -> str:
-        return "-" if value is None else f"{value:+.3f}"
-
-    for s in found:
-        points = f"{number(s.neutral_point_vertical)}, {number(s.neutral_point_horizontal)}"
-        critical = f"{speed(s.critical_speed_stern)}, {speed(s.critical_speed_sail)}"
-        signs = [f"[{'green' if (g or 0.0) > 0 else 'red'}]{number(g)}[/]" for g in (s.g_vertical, s.g_horizontal)]
-        table.add_row(f"{s.speed:.3f}", f"{s.depth:g}", *signs, points, critical, root(s.vertical), root(s.horizontal))
-    console.print(table)
-    states = " or ".join(dict.fromkeys(s.about for s in found))
-    console.print(f"last two columns: least stable root about straight level motion, {states}")
+            states.append(replace(stability_at(coefficients, environment, speed, depth), _whole=whole))
+    return StabilityMap(vehicle.title, number, tuple(states))

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ident.cfd.template import UNITS, Template
 from sim.boat.vehicle import Plane, Vehicle
+from sim.files.constants import constant
 from sim.files.errors import InputError
 from sim.hull.added_mass import panel_added_mass, wetted_panels
 from sim.hull.mesh import Mesh, MeshError, joined
@@ -257,6 +258,12 @@ def _numbers(lines: Lines, template: Template, vehicle: Vehicle) -> list[Check]:
     return out + _added_mass(wet, other, template)
 
 
+def _unbounded(panels: Mesh, density: float) -> Array:
+    """Added mass of six motions far from the surface [kg, kg m, kg m^2]; raises ``InputError`` without capytaine."""
+    matrix = panel_added_mass(panels, np.inf, [np.inf], density, constant("standard_gravity"))[0][0]
+    return -np.diag(matrix)
+
+
 def _added_mass(wet: Mesh, other: Mesh | None, template: Template) -> list[Check]:
     """Added mass in unbounded water over rho/2 L^n by the panel method, where capytaine is installed."""
     if len(wet.triangles) > _MOST_PANELS:
@@ -264,21 +271,21 @@ def _added_mass(wet: Mesh, other: Mesh | None, template: Template) -> list[Check
     ratio, density = template.surface.ratio, template.fluid.density_kgpm3
     powers = np.array([3.0, 3.0, 3.0, 5.0, 5.0, 5.0])
     try:
-        own = -np.diag(panel_added_mass(wet, np.inf, [np.inf], density, 9.81)[0][0]) * ratio**powers
-        if other is None:
-            return [Check(f"{name} by panels [kg, kg m2]", value) for name, value in zip(_MOTIONS, own, strict=True)]
-        coarse = wetted_panels(other)
-        if len(coarse.triangles) > _MOST_PANELS:
-            return [Check(f"{name} by panels [kg, kg m2]", value) for name, value in zip(_MOTIONS, own, strict=True)]
-        theirs = -np.diag(panel_added_mass(coarse, np.inf, [np.inf], density, 9.81)[0][0])
+        by_panels = _unbounded(wet, density) * ratio**powers
+        coarse = None if other is None else wetted_panels(other)
+        if coarse is None or len(coarse.triangles) > _MOST_PANELS:
+            rows = zip(_MOTIONS, by_panels, strict=True)
+            return [Check(f"{name} by panels [kg, kg m2]", value) for name, value in rows]
+        theirs = _unbounded(coarse, density)
     except InputError:
         return []
     allowed = template.tolerances.added_mass
     # Roll about the axis of a body of revolution is nothing, of which no part is compared.
     least = 1e-3 * np.abs(theirs[3:]).max()
-    offs = [abs(a - b) / max(abs(b), least if k > 2 else 0.0) for k, (a, b) in enumerate(zip(own, theirs, strict=True))]
-    rows = zip(_MOTIONS, own, theirs, offs, strict=True)
-    return [Check(f"{n} by panels [kg, kg m2]", a, b, off, allowed) for n, a, b, off in rows]
+    pairs = enumerate(zip(by_panels, theirs, strict=True))
+    offs = [abs(a - b) / max(abs(b), least if k > 2 else 0.0) for k, (a, b) in pairs]
+    compared = zip(_MOTIONS, by_panels, theirs, offs, strict=True)
+    return [Check(f"{n} by panels [kg, kg m2]", a, b, off, allowed) for n, a, b, off in compared]
 
 
 def turned(lines: Lines, patches: list[str], plane: Plane, angle: float, ratio: float, where: str) -> dict[str, Mesh]:

@@ -326,7 +326,7 @@ def stability(
              ident stability --out roots.svg
     """
     import ident
-    from ident.analysis.stability import show
+    from ident.analysis.tables import show
 
     for name, values in (("speed", speeds), ("depth", depths)):
         if any(not math.isfinite(v) for v in values):

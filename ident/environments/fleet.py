@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from typing import Any
+from typing import Any, Unpack
 
 import numpy as np
 from gymnasium import spaces
@@ -11,7 +11,8 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from ident.environments.boat import action_space, goal_of, setting, steps_of
+from ident.environments.boat import action_space
+from ident.environments.episode import Options, episode
 from ident.environments.tasks import TASKS
 from sim.flight.fleet import FleetPlant
 
@@ -38,20 +39,12 @@ class FleetEnv(VectorEnv[Array, Array, Any]):
         num_envs: int = 1,
         task: str = "DepthKeeping",
         case: str | os.PathLike[str] = "hzz20",
-        db: str | os.PathLike[str] = "coeff_db",
-        version: int | None = None,
-        vehicle: str | None = None,
-        period: float | None = None,
-        duration: float | None = None,
-        spread: float = 0.0,
-        **numbers: Any,
+        **options: Unpack[Options],
     ) -> None:
-        data, coefficients = setting(case, db, version, vehicle)
-        self.num_envs, self.plant = num_envs, FleetPlant(data, coefficients, num_envs)
-        self._steps = steps_of(period if period is not None else self.plant.dt, data)
-        self._duration, self._spread = duration or data.run.duration_s, spread
+        self._episode = episode(case, options)
+        self.num_envs, self.plant = num_envs, FleetPlant(self._episode.case, self._episode.coefficients, num_envs)
         boat = self.plant.vehicle
-        self.task = TASKS[task](goal_of(boat, numbers), self.plant.start, num_envs)
+        self.task = TASKS[task](self._episode.goal, self.plant.start, num_envs)
         self.single_action_space = self._box = action_space(boat)
         shape = (len(self.task.observed),)
         self.single_observation_space = spaces.Box(-np.inf, np.inf, shape, np.float64)
@@ -68,8 +61,10 @@ class FleetEnv(VectorEnv[Array, Array, Any]):
 
     def _begin(self, which: NDArray[np.bool_]) -> None:
         self.plant.reset(which)
-        if self._spread and which.any():
-            self.plant.state[which, 10:12] += self._spread * self.np_random.standard_normal((int(which.sum()), 2))
+        if self._episode.spread and which.any():
+            self.plant.state[which, 10:12] += self._episode.spread * self.np_random.standard_normal(
+                (int(which.sum()), 2)
+            )
         self.task.reset(which)
         self._time[which], self._over[which] = 0.0, False
 
@@ -79,11 +74,11 @@ class FleetEnv(VectorEnv[Array, Array, Any]):
         again = self._over.copy()
         given = np.clip(np.asarray(actions, dtype=float), box.low, box.high)
         self.plant.commands[:, :2] = given
-        self.plant.step(self._steps)
-        self._time += self._steps * self.plant.dt
+        self.plant.step(self._episode.steps)
+        self._time += self._episode.steps * self.plant.dt
         reward, done = self.task.judge(self.plant.state, given / box.high)
         lost = ~np.isfinite(self.plant.state).all(axis=1)
-        ended = self._time >= self._duration - 1e-9
+        ended = self._time >= self._episode.duration - 1e-9
         reward[lost | again], done[again], ended[again] = 0.0, False, False
         self._begin(again | lost)
         self._over = (done & ~lost) | ended

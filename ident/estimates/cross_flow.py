@@ -13,13 +13,17 @@ r|r| times a function of v/r alone, and beyond the ends of the hull a straight l
 
 from __future__ import annotations
 
+import csv
 from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sim.boat.vehicle import Vehicle
+from sim.files.constants import constant
 from sim.files.errors import InputError
 from sim.files.toml_files import read_toml
 from sim.hull.surface import Geometry, hull_of
@@ -28,12 +32,18 @@ Array = NDArray[np.float64]
 
 # Sections along the hull; more change nothing in four digits.
 _SECTIONS = 400
-# Drag of a long cylinder across the flow: least beyond the critical Reynolds number, most below it (Roshko
-# 1961, J. Fluid Mech. 10, who measures 0.7 beyond 3.5e6, the middle; Hoerner 1965, ch. 3).
-_LEAST, _MOST = 0.2, 1.2
-# Drag of a cylinder of finite length on that of a long one (Hoerner 1965, ch. 3; Allen and Perkins use it as eta).
-_LENGTH_TO_DIAMETER = np.array([1.0, 2.0, 3.0, 5.0, 10.0, 20.0, 40.0])
-_FINITE = np.array([0.53, 0.57, 0.60, 0.62, 0.68, 0.76, 0.82])
+# Drag of a long cylinder across the flow: least beyond the critical Reynolds number, most below it. Roshko measures
+# 0.7 beyond 3.5e6, the middle.
+_LEAST, _MOST = constant("cylinder_drag_least"), constant("cylinder_drag_most")
+
+
+@cache
+def _finite_cylinders() -> tuple[Array, Array]:
+    """Length over diameter, and drag on that of a long cylinder, which Allen and Perkins use as eta."""
+    with (files("ident") / "data" / "finite_cylinders.csv").open(encoding="utf-8", newline="") as file:
+        rows = [(float(r["length_to_diameter"]), float(r["drag_on_that_of_a_long_one"])) for r in csv.DictReader(file)]
+    slender, drag = np.array(rows).T
+    return slender, drag
 
 
 @dataclass(frozen=True)
@@ -123,7 +133,8 @@ def literature_drag(hull: Strips) -> tuple[float, float]:
     A long cylinder between its least and its most (uniform), times the end effect at length over diameter.
     """
     slender = (hull.x.max() - hull.x.min()) / hull.width.max()
-    end = float(np.interp(np.log(slender), np.log(_LENGTH_TO_DIAMETER), _FINITE))
+    measured, drag = _finite_cylinders()
+    end = float(np.interp(np.log(slender), np.log(measured), drag))
     return end * 0.5 * (_LEAST + _MOST), end * (_MOST - _LEAST) / np.sqrt(12.0)
 
 

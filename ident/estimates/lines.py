@@ -10,6 +10,7 @@ from ident.estimates.draft import Draft, Mask, NotApplicable
 from ident.estimates.turning import Given
 from sim.boat.parts import vehicle_terms
 from sim.boat.vehicle import Vehicle
+from sim.files.constants import constant
 from sim.files.errors import InputError
 from sim.hull.derivatives import Derivative, derivatives
 from sim.hull.slender import Lines, friction, hull_added_mass, lines
@@ -21,8 +22,8 @@ _TABLES = {
     name: (name[0] + "_uvw", "beta" if name[2] == "v" else "alpha") for name in ("Y_v", "N_v", "K_v", "Z_w", "M_w")
 }
 _ANGLES = (-12.0, -8.0, -4.0, 4.0, 8.0, 12.0)
-# Added mass: term -> key of ``hull_added_mass``, sign, power of L. Fins and sail are not in it; measured added mass of
-# SUBOFF with all its appendages is 15 % below that of its hull by potential flow (Roddy 1990).
+# Added mass: term -> key of ``hull_added_mass``, sign, power of L. Fins and sail are not in it: measured added mass of
+# SUBOFF with all its appendages is below that of its hull by potential flow.
 _ADDED = {
     "X_udot": ("udot", -1.0, 3),
     "Y_vdot": ("vdot", -1.0, 3),
@@ -34,9 +35,9 @@ _ADDED = {
     "Z_qdot": ("vr", 1.0, 4),
     "M_wdot": ("vr", 1.0, 4),
 }
-_ADDED_ERROR = 0.15
-# Resistance: form factor of a slender hull with appendages on the friction line (Hoerner 1965, ch. 6), and its range.
-_FORM, _FORM_ERROR, _VISCOSITY = 1.3, 0.15, 1.19e-6
+_ADDED_ERROR = constant("added_mass_range")
+# Resistance on the friction line.
+_FORM, _FORM_ERROR = constant("form_factor"), constant("form_factor_range")
 _WORD = "lines"
 
 
@@ -142,7 +143,7 @@ def _add_drag(draft: Draft, hull: Lines) -> list[str]:
     length = draft.vehicle.particulars.length.value
     done: list[str] = []
     # At a Froude number of 0.2; the friction line moves by 2 % for half and for double.
-    reynolds = 0.2 * np.sqrt(9.81 * length) * length / _VISCOSITY
+    reynolds = 0.2 * np.sqrt(constant("standard_gravity") * length) * length / constant("sea_water_viscosity")
     value = np.array([-_FORM * friction(reynolds) * hull.wetted / length**2])
     for name in ("X_uu", "X_uvw"):
         if name in names and not draft.has(name):

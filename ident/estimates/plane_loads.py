@@ -11,12 +11,13 @@ import numpy as np
 from ident.estimates.carry_over import CarryOver, carry_over
 from ident.estimates.downwash import slopes, tail_downwash
 from ident.estimates.draft import Draft, NotApplicable
+from sim.files.constants import constant
 from sim.files.errors import InputError
 
 _STERN = ("stern_plane_*",)
 # Lift of a real surface on that of a lattice, and its deviation: the boundary layer takes some per cent of the
-# slope of a section (Abbott and von Doenhoff 1959, ch. 7), and lattices are as good as that at small aspect ratio.
-_VISCOUS, _LATTICE = 0.95, 0.05
+# slope of a section, and lattices are as good as that at small aspect ratio.
+_VISCOUS, _LATTICE = constant("lift_on_lattice"), constant("lift_on_lattice_range")
 
 
 def lift_slope(draft: Draft, planes: CarryOver) -> tuple[float, float, float]:

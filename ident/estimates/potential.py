@@ -19,13 +19,14 @@ from ident.estimates.draft import Draft, NotApplicable
 from sim.boat.catalogue import OUTPUTS, Term
 from sim.boat.coefficients import Coefficients
 from sim.boat.parts import vehicle_terms
+from sim.files.constants import constant
 from sim.kernel.assemble import Environment, added_mass_matrix
 
 Array = NDArray[np.float64]
 
 _MOTIONS = ("u", "v", "w", "p", "q", "r")
 # The density cancels: coefficients are over it.
-_UNIT = Environment(1.0, 9.81)
+_UNIT = Environment(1.0, constant("standard_gravity"))
 
 
 def impulse_loads(added: Array, motion: Array) -> Array:

@@ -6,8 +6,11 @@ says so, or says what is missing. None reads a maneuver. ``docs/prediction.md`` 
 
 from __future__ import annotations
 
+import csv
 from collections.abc import Callable, Collection
 from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
 from typing import TYPE_CHECKING
 
 from ident.estimates.draft import Draft, NotApplicable
@@ -44,75 +47,30 @@ class Method:
     work: Callable[[Draft, Given], str]
 
 
-METHODS = (
-    Method(
-        "lines",
-        "derivatives, added mass and resistance that no run gives, from the lines",
-        "Munk (1924); Hopkins (1951); NACA Report 1307; Lamb (1932); ITTC 1957",
-        from_lines,
-    ),
-    Method("shared_errors", "errors that runs have in common", "the campaign file", shared_errors),
-    Method(
-        "axial_in_drift",
-        "error of the axial force in drift",
-        "a small resultant of large pressures",
-        lambda draft, given: axial_in_drift(draft),
-    ),
-    Method(
-        "extrapolation",
-        "errors of coefficients beyond the rates of their runs",
-        "the trend over the runs, continued",
-        lambda draft, given: extrapolation(draft),
-    ),
-    Method(
-        "saturation",
-        "lift of planes beyond the straight part",
-        "Whicker and Fehlner (1958), DTMB Report 933; the campaign's runs",
-        lambda draft, given: saturation(draft),
-    ),
-    Method(
-        "carry_over",
-        "what a deflected stern plane loads on root, hull and other fins",
-        "vortex lattice after NACA Report 1307 (Pitts, Nielsen and Kaattari 1957)",
-        lambda draft, given: carried_over(draft),
-    ),
-    Method(
-        "tail_downwash",
-        "sail planes with their roots, and their vortices at the stern planes",
-        "NACA Report 1307; Katz and Plotkin",
-        lambda draft, given: sail_planes(draft),
-    ),
-    Method(
-        "cross_flow",
-        "cross-flow along the hull where drift and rotation come together",
-        "Allen and Perkins (1951); Feldman (1979); Hoerner (1965); Roshko (1961)",
-        cross_flow,
-    ),
-    Method(
-        "pure_pitch",
-        "pure pitch with forward speed, where runs have it without",
-        "Allen and Perkins (1951); the campaign's runs in heave",
-        pure_pitch,
-    ),
-    Method(
-        "roll_damping",
-        "roll damping in oscillation, beyond the rates of steady runs",
-        "Graham (1980), J. Fluid Mech. 97; the campaign's runs",
-        roll_damping,
-    ),
-    Method(
-        "even_loads",
-        "loads linear in |r| that the mirror makes even",
-        "symmetry",
-        even_loads,
-    ),
-    Method(
-        "unmeasured",
-        "terms that no run identifies",
-        "Kirchhoff's equations (Lamb 1932)",
-        lambda draft, given: unmeasured(draft),
-    ),
-)
+# What each estimate does; its title and source stand in ``ident/data/estimates.csv``.
+_WORK: dict[str, Callable[[Draft, Given], str]] = {
+    "lines": from_lines,
+    "shared_errors": shared_errors,
+    "axial_in_drift": lambda draft, given: axial_in_drift(draft),
+    "extrapolation": lambda draft, given: extrapolation(draft),
+    "saturation": lambda draft, given: saturation(draft),
+    "carry_over": lambda draft, given: carried_over(draft),
+    "tail_downwash": lambda draft, given: sail_planes(draft),
+    "cross_flow": cross_flow,
+    "pure_pitch": pure_pitch,
+    "roll_damping": roll_damping,
+    "even_loads": even_loads,
+    "unmeasured": lambda draft, given: unmeasured(draft),
+}
+
+
+@cache
+def methods() -> tuple[Method, ...]:
+    """Every estimate, in the order in which they work."""
+    with (files("ident") / "data" / "estimates.csv").open(encoding="utf-8", newline="") as file:
+        return tuple(
+            Method(row["name"], row["title"], row["source"], _WORK[row["name"]]) for row in csv.DictReader(file)
+        )
 
 
 @dataclass(frozen=True)
@@ -135,7 +93,7 @@ class Estimated:
 
 def names() -> list[str]:
     """Names of the estimates, in the order in which they work."""
-    return [m.name for m in METHODS]
+    return [m.name for m in methods()]
 
 
 def check_names(chosen: Collection[str], where: str) -> None:
@@ -168,7 +126,7 @@ def predicted(
     """
     check_names(without, "estimates to leave out")
     draft, done = Draft.of(vehicle, rows), []
-    for method in METHODS:
+    for method in methods():
         if method.name in without:
             done.append(Estimated(method.name, method.title, method.source, False, "left out"))
             continue

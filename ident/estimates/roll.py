@@ -21,6 +21,7 @@ from ident.estimates.turning import Given
 from sim.boat.coefficients import Coefficients
 from sim.boat.mass import Environment, added_mass_matrix
 from sim.boat.vehicle import Vehicle
+from sim.files.constants import constant
 from sim.files.errors import InputError
 from sim.hull.fins import fins_of, sail_fin
 from sim.hull.lattice import Fin
@@ -28,11 +29,10 @@ from sim.hull.slender import geometry_of, lines
 
 Array = NDArray[np.float64]
 
-# Graham (1980): drag of a plate in oscillation over KC^(-1/3), both edges sharp.
-_PLATE, _POWER = 8.0, -1.0 / 3.0
+# Drag of a plate in oscillation over KC^(-1/3), both edges sharp.
+_PLATE, _POWER = constant("oscillating_plate_drag"), constant("oscillating_plate_power")
 # Amplitudes of the roll rate in degrees of roll at the natural period.
 _ROLL_DEG = (1.0, 2.0, 5.0, 10.0, 20.0)
-_STANDARD_GRAVITY = 9.80665
 
 
 def natural_frequency(draft: Draft) -> float:
@@ -47,11 +47,11 @@ def natural_frequency(draft: Draft) -> float:
     lever = particulars.centre_of_gravity.value[2] - particulars.centre_of_buoyancy.value[2]
     density = particulars.displaced_mass.value / lines(vehicle).volume
     rows = draft.rows.assign(value=draft.value)
-    water = added_mass_matrix(Coefficients(vehicle, rows), Environment(density, _STANDARD_GRAVITY))[3, 3]
+    water = added_mass_matrix(Coefficients(vehicle, rows), Environment(density, constant("standard_gravity")))[3, 3]
     inertia = particulars.mass.value * (particulars.radius_of_gyration.value[0] ** 2 + lever**2) + water
     if lever <= 0.0:
         raise NotApplicable("no lever that rights the boat")
-    return float(np.sqrt(particulars.mass.value * _STANDARD_GRAVITY * lever / inertia))
+    return float(np.sqrt(particulars.mass.value * constant("standard_gravity") * lever / inertia))
 
 
 def edge_drag(fins: list[Fin], angle: float) -> float:

@@ -112,8 +112,8 @@ def metric_intervals(bands: Bands) -> dict[str, Interval]:
     for name in names:
         known = np.array([x for x in (one.get(name) for one in bands.metrics) if x is not None], dtype=float)
         known = known[np.isfinite(known)]
-        quantiles = [float(np.quantile(known, q)) if known.size else None for q in _QUANTILES]
-        intervals[name] = Interval(*quantiles, without=1.0 - known.size / len(bands.metrics))
+        low, middle, high = (float(np.quantile(known, q)) if known.size else None for q in _QUANTILES)
+        intervals[name] = Interval(low, middle, high, without=1.0 - known.size / len(bands.metrics))
     return intervals
 
 

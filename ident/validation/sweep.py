@@ -60,7 +60,9 @@ def _solved(case: Case, vehicle: Vehicle, model: Model, speed: float, depth: flo
     tanks = controls[len(vehicle.planes) + 1 :]
     angles = np.degrees([trim.state[10], trim.state[9], trim.dV, trim.dH])
     values = [controls[len(vehicle.planes)], *angles, *(tanks if len(tanks) else (0.0, 0.0))]
-    return SweepPoint(speed, depth, *map(float, values), limited=list(trim.limited))
+    names = ("n_rps", "pitch_deg", "heel_deg", "dV_deg", "dH_deg", "ballast_kg", "trim_tank_m")
+    solved = {name: float(value) for name, value in zip(names, values, strict=True)}
+    return replace(SweepPoint(speed, depth, limited=list(trim.limited)), **solved)
 
 
 def _named(point: SweepPoint) -> str:

@@ -6,6 +6,7 @@ import math
 from typing import TYPE_CHECKING
 
 from sim.boat.catalogue import held
+from sim.files.constants import constant
 from sim.files.errors import InputError
 from sim.flight.trim import NoEquilibrium
 
@@ -14,12 +15,11 @@ if TYPE_CHECKING:
     from sim.flight.case import Case
     from sim.waves.linear import Waves
 
-# Height over length of the steepest wave in deep water (Michell 1893, Philosophical Magazine 36, 430-437).
-_STEEPEST = 0.1418
+# Height over length of the steepest wave in deep water.
+_STEEPEST = constant("steepest_wave")
 # Waves shorter than this part of the boat's length load it no more, and cost memory without bound.
 _SHORTEST = 0.01
-# The deepest place of the sea [m] (GEBCO, Challenger Deep).
-_DEEPEST = 10_935.0
+_DEEPEST = constant("deepest_sea")
 # Faster than anything that keeps its hull wetted [m/s].
 _FASTEST = 100.0
 

@@ -20,6 +20,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from sim.files.constants import constant
 from sim.hull.lattice import Fin, in_cylinder, influence, lattice, normal_load
 from sim.hull.slender import Lines
 from sim.hull.surface import Geometry
@@ -27,9 +28,8 @@ from sim.hull.surface import Geometry
 Array = NDArray[np.float64]
 
 _COUNTS = (4, 6, 4)
-# Lift of a real surface on that of a lattice, and its deviation: the boundary layer takes some per cent (Abbott and von
-# Doenhoff 1959, ch. 7).
-_VISCOUS, _LATTICE = 0.95, 0.05
+# Lift of a real surface on that of a lattice, and its deviation: the boundary layer takes some per cent.
+_VISCOUS, _LATTICE = constant("lift_on_lattice"), constant("lift_on_lattice_range")
 # Place of a rolled-up tip vortex over the span: elliptic loading.
 _ROLLED_UP = np.pi / 4.0
 _UNIFORM = 1.0 / np.sqrt(12.0)

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.boat.vehicle import Vehicle
+from sim.files.constants import constant
 from sim.files.errors import InputError
 from sim.files.toml_files import read_toml
 from sim.hull.surface import Geometry, hull_of
@@ -25,7 +26,7 @@ Array = NDArray[np.float64]
 
 _SECTIONS = 800
 # Hopkins (1951): station at which potential flow ends, over the length and over the station of steepest decrease.
-_OF_LENGTH, _OF_STEEPEST = 0.378, 0.527
+_OF_LENGTH, _OF_STEEPEST = constant("potential_flow_ends_length"), constant("potential_flow_ends_steepest")
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,104 @@
+"""What every episode of an environment has in common: boat, case, times, numbers of the task."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, TypedDict, cast
+
+from ident.environments.tasks import Goal
+from sim.boat.coefficients import Coefficients
+from sim.boat.database import read_rows
+from sim.boat.vehicle import Vehicle, load_vehicle
+from sim.files.errors import InputError
+from sim.flight.case import Case, load_case
+
+
+class Options(TypedDict, total=False):
+    """What an environment may be asked beside task and case.
+
+    Attributes
+    ----------
+    db, version : Database, ``coeff_db`` by default, and version, latest when None.
+    vehicle : Instead of the case's.
+    period : Time between actions [s], the case's step when None.
+    duration : After which an episode is truncated [s], the case's when None.
+    spread : Standard deviation of the start: pitch and heading [rad], by the seed; none when zero.
+    check, legs, path, ahead, effort : Of the task, ``ident.environments.tasks.Goal``.
+    """
+
+    db: str | os.PathLike[str]
+    version: int | None
+    vehicle: str | None
+    period: float | None
+    duration: float | None
+    spread: float
+    check: float
+    legs: int
+    path: Sequence[Sequence[float]]
+    ahead: float
+    effort: float
+
+
+@dataclass(frozen=True)
+class Episode:
+    """A task of a boat in a case.
+
+    Attributes
+    ----------
+    case, coefficients : What is flown.
+    steps : Control samples between actions.
+    duration : After which an episode is truncated [s].
+    spread : Standard deviation of pitch and heading at the start [rad].
+    goal : Numbers of the task.
+    """
+
+    case: Case
+    coefficients: Coefficients
+    steps: int
+    duration: float
+    spread: float
+    goal: Goal
+
+
+def _goal(vehicle: Vehicle, numbers: dict[str, Any]) -> Goal:
+    known = sorted(set(Goal.__dataclass_fields__) - {"length"})
+    for name in numbers:
+        if name not in known:
+            raise InputError(f"environment, {name}", "no such number of a task", ", ".join(known))
+    if "path" in numbers:
+        numbers = numbers | {"path": tuple(map(tuple, numbers["path"]))}
+    return Goal(length=vehicle.particulars.length.value, **numbers)
+
+
+def _steps(period: float, case: Case) -> int:
+    steps = round(period / case.run.step_s)
+    if steps < 1 or abs(steps * case.run.step_s - period) > 1e-9:
+        allowed = f"a multiple of the case's step, {case.run.step_s:g} s"
+        raise InputError("environment, period", f"{period:g} s", allowed)
+    return steps
+
+
+def episode(case: str | os.PathLike[str], options: Options) -> Episode:
+    """The episodes that an environment was asked for.
+
+    Raises
+    ------
+    InputError
+        For what does not exist or fit, a number that no task has, or a time between actions that is no multiple of
+        the case's step.
+    """
+    asked = cast("dict[str, Any]", dict(options))
+    db, version, vehicle = asked.pop("db", "coeff_db"), asked.pop("version", None), asked.pop("vehicle", None)
+    period, duration, spread = asked.pop("period", None), asked.pop("duration", None), asked.pop("spread", 0.0)
+    data, where = load_case(os.fspath(case))
+    boat = load_vehicle(vehicle) if vehicle else load_vehicle(data.vehicle, beside=where)
+    return Episode(
+        case=data,
+        coefficients=Coefficients(boat, read_rows(os.fspath(db), version, boat.name)[0]),
+        steps=_steps(period if period is not None else data.run.step_s, data),
+        duration=duration or data.run.duration_s,
+        spread=spread,
+        goal=_goal(boat, asked),
+    )
