@@ -20,7 +20,7 @@ sys.path[:0] = [str(ROOT), str(ROOT / "docs")]
 
 import choices
 import evidence
-from reference_tables import axes_table, key_tables, room_tables, table
+from reference_tables import axes_table, constants_table, key_tables, room_tables, table
 
 import ident
 from ident.analysis.derivatives import derivatives
@@ -236,7 +236,7 @@ def main() -> int:
         ROOT / "docs" / "integration.md": {"steps": steps()},
         ROOT / "docs" / "terms.md": {"terms": term_table()},
         ROOT / "docs" / "checks.md": {"checks": check_table()},
-        ROOT / "docs" / "nomenclature.md": {"axes": axes_table()},
+        ROOT / "docs" / "nomenclature.md": {"axes": axes_table(), "constants": constants_table()},
         ROOT / "docs" / "keys.md": {"keys": key_tables()},
         ROOT / "docs" / "architecture.md": {"rooms": room_tables()},
     }

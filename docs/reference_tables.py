@@ -8,6 +8,7 @@ from pathlib import Path
 
 from ident.schemas.describe import KINDS, Key, keys
 from sim.boat import catalogue
+from sim.files.constants import constants
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -23,6 +24,12 @@ def axes_table() -> str:
     sign = {1: "even", -1: "odd"}
     rows = [[f"`{a.name}`", f"`{a.column}`", a.unit, sign[a.mirror], a.meaning] for a in catalogue.axes().values()]
     return table(["axis", "column", "unit", "mirror", "meaning"], rows)
+
+
+def constants_table() -> str:
+    """Every physical constant, from ``sim/data/constants.csv``."""
+    rows = [[f"`{c.name}`", f"{c.value:.6g}", c.unit, c.meaning, c.source] for c in constants().values()]
+    return table(["name", "value", "unit", "meaning", "source"], rows)
 
 
 def _key_row(key: Key) -> list[str]:

@@ -5,12 +5,25 @@ from __future__ import annotations
 import csv
 from functools import cache
 from importlib.resources import files
+from typing import NamedTuple
+
+
+class Constant(NamedTuple):
+    """A row of the table."""
+
+    name: str
+    value: float
+    unit: str
+    meaning: str
+    source: str
 
 
 @cache
-def _table() -> dict[str, float]:
+def constants() -> dict[str, Constant]:
+    """Every constant by its name."""
     with (files("sim") / "data" / "constants.csv").open(encoding="utf-8", newline="") as file:
-        return {row["name"]: float(row["value"]) for row in csv.DictReader(file)}
+        rows = list(csv.DictReader(file))
+    return {r["name"]: Constant(r["name"], float(r["value"]), r["unit"], r["meaning"], r["source"]) for r in rows}
 
 
 def constant(name: str) -> float:
@@ -21,4 +34,4 @@ def constant(name: str) -> float:
     >>> constant("standard_gravity")
     9.80665
     """
-    return _table()[name]
+    return constants()[name].value
