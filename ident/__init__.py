@@ -119,8 +119,8 @@ if "gymnasium" in sys.modules:
 def __getattr__(name: str) -> Any:
     if name not in _PLACES:
         raise AttributeError(f"module 'ident' has no attribute {name!r}")
-    found = globals()[name] = getattr(import_module(_PLACES[name]), name)
-    return found
+    public = globals()[name] = getattr(import_module(_PLACES[name]), name)
+    return public
 
 
 def __dir__() -> list[str]:

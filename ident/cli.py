@@ -30,10 +30,10 @@ class Commands(click.Group):
         try:
             if not _stands_somewhere():
                 _refuse(ctx, "the working folder", "no longer there", "a folder that exists")
-            found = super().invoke(ctx)
+            result = super().invoke(ctx)
             # What cannot be written shows here at the latest, not when Python ends.
             sys.stdout.flush()
-            return found
+            return result
         except BrokenPipeError:
             silence("stdout")
             ctx.exit(1)

@@ -53,15 +53,15 @@ def connected(address: str) -> Any:
     except (OSError, ValueError, TypeError) as error:
         raise InputError(f"--dask {address}", f"no scheduler answers: {error}", _ADDRESS) from error
     try:
-        found = set(client.run(program_version).values())
+        versions = set(client.run(program_version).values())
     except Exception as error:
         # What a worker cannot import arrives as a plain Exception with the text of its own.
         client.close()
         allowed = f"workers with ident {__version__}"
         raise InputError(f"--dask {address}", f"workers that cannot run ident: {error}", allowed) from error
-    if found != {__version__}:
+    if versions != {__version__}:
         client.close()
-        text = f"workers with ident {', '.join(sorted(found))}" if found else "a scheduler without workers"
+        text = f"workers with ident {', '.join(sorted(versions))}" if versions else "a scheduler without workers"
         raise InputError(f"--dask {address}", text, f"workers with ident {__version__}")
     return client
 

@@ -50,10 +50,10 @@ def on_screen(text: object) -> str:
     return shown + "\\" * (len(shown) - len(shown.rstrip("\\")))
 
 
-def _escaped(found: re.Match[str]) -> str:
+def _escaped(match: re.Match[str]) -> str:
     """A bracket after backslashes, which rich counts where it takes the bracket for markup."""
-    before = found[1]
-    return (before * 2 if found[2] else before) + "\\[" + (found[2] or "")
+    before = match[1]
+    return (before * 2 if match[2] else before) + "\\[" + (match[2] or "")
 
 
 def in_figure(text: object) -> str:

@@ -67,7 +67,7 @@ def test_a_stage_is_the_least_squares_written_out_in_full(seed, full):
     a, b, value, spread, shared, old, covariance = given = stage(seed)
     found = solve_stage(csr_array(a), csr_array(b), value, spread, np.sign(value), shared, old, covariance, full)
     assert not found.lost
-    parts = (found.values, found.own, found.cross, found.residual, found.leverage)
+    parts = (found.values, found.covariance, found.cross, found.residual, found.leverage)
     for got, wanted in zip(parts, in_full(*given), strict=True):
         np.testing.assert_allclose(got, wanted, rtol=1e-9, atol=1e-11)
 

@@ -192,12 +192,14 @@ def derivatives(
     length = vehicle.particulars.length.value
     models = [assemble(c, environment) for c in (_Parts(coefficients, _HULL), coefficients)]
     slopes: dict[str, list[Array]] = {}
-    found = []
+    compared = []
     for check in checks():
         output, motion = check.symbol.split("_")
         if motion not in slopes:
             slopes[motion] = [slope(m, vehicle, motion, speed, depth, revolutions) for m in models]
         scale = prime_scale(output, motion, environment.density, length) * speed
         hull, whole = (float(s[OUTPUTS.index(output)]) / scale for s in slopes[motion])
-        found.append(Derivative(check.symbol, hull, whole, check.expected, check.suboff, whole * check.expected > 0.0))
-    return found
+        compared.append(
+            Derivative(check.symbol, hull, whole, check.expected, check.suboff, whole * check.expected > 0.0)
+        )
+    return compared

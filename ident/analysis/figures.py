@@ -32,12 +32,12 @@ def response(linear: Linear, output: str, frequencies: Array) -> NDArray[np.comp
     return np.array([np.linalg.solve(1j * w * one - a, b)[k] for w in frequencies])
 
 
-def stability_figure(found: StabilityMap, path: Path) -> Path:
+def stability_figure(over: StabilityMap, path: Path) -> Path:
     """Root loci over speed, a colour a depth, and Bode plots of pitch by dV and yaw rate by dH.
 
     Parameters
     ----------
-    found : Over speeds and depths.
+    over : Over speeds and depths.
     path : ``.png``, ``.svg`` or ``.pdf``.
 
     Raises
@@ -47,14 +47,14 @@ def stability_figure(found: StabilityMap, path: Path) -> Path:
     """
     if path.suffix not in _ENDINGS:
         raise InputError(str(path), f"the ending {path.suffix!r}", ", ".join(_ENDINGS))
-    states = [s for s in found if s.linear]
+    states = [s for s in over if s.linear]
     if not states:
         raise InputError("stability, figure", "no linear model at any speed and depth", "a boat with added mass")
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(11.0, 9.0), layout="constrained")
     _draw(figure, states)
-    figure.suptitle(in_figure(f"{found.title}, database version {found.version}"))
+    figure.suptitle(in_figure(f"{over.title}, database version {over.version}"))
     with whole(path) as part:
         figure.savefig(part, format=path.suffix[1:], dpi=130)
     return path

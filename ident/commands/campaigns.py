@@ -74,12 +74,12 @@ def check(folder: Path, json_path: str | None, strict: bool, everything: bool) -
 
     console = console_for(quiet=json_path == "-")
     with console.status("checking") as status:
-        found = ident.check(folder, lambda path: status.update(f"checking {on_screen(path)}"))
-    for one in found:
+        checked = ident.check(folder, lambda path: status.update(f"checking {on_screen(path)}"))
+    for one in checked:
         show(one.findings, f"{one.campaign.header.name}: {len(one.campaign.runs)} runs", console, everything)
     if json_path:
-        emit(found.to_dict(), json_path)
-    if strict and any(one.counts["error"] for one in found):
+        emit(checked.to_dict(), json_path)
+    if strict and any(one.counts["error"] for one in checked):
         sys.exit(1)
 
 
@@ -166,8 +166,8 @@ def runs(folder: Path, out: Path, json_path: str | None) -> None:
 
     console = console_for(quiet=json_path == "-")
     with console.status("reading and reducing"):
-        found = read(folder, none_yet=is_matrix(folder))
-    for campaign in found:
+        campaigns = read(folder, none_yet=is_matrix(folder))
+    for campaign in campaigns:
         if len(campaign.runs):
             show(campaign, console)
     cases = None
@@ -175,14 +175,14 @@ def runs(folder: Path, out: Path, json_path: str | None) -> None:
         from ident.cfd.progress import progress
         from ident.cfd.screen import show_progress
 
-        cases = progress(read_matrix(folder), found[0])
+        cases = progress(read_matrix(folder), campaigns[0])
         show_progress(cases, console)
-    histories = tuple(one for campaign in found for one in campaign.reduced)
+    histories = tuple(one for campaign in campaigns for one in campaign.reduced)
     if histories:
         from ident.captive.history_figures import history_figures
 
         for path in history_figures(histories, out):
             console.print(f"figure: {on_screen(path)}", highlight=False)
     if json_path:
-        rows = [row for campaign in found for row in as_json(campaign)]
+        rows = [row for campaign in campaigns for row in as_json(campaign)]
         emit(rows if cases is None else {"runs": rows, **cases.to_dict()}, json_path)

@@ -61,16 +61,16 @@ def doctor(folders: tuple[Path, ...], db: str | None, repair: bool, wait: float,
         sys.exit(1)
 
 
-def _show_installation(found: dict[str, Any], console: Any) -> None:
-    packages = ", ".join(f"{name} {version}" for name, version in found["packages"].items() if version)
-    threads = ", ".join(f"{name} {value}" for name, value in found["threads"].items())
-    cache = found["cache"]
+def _show_installation(installed: dict[str, Any], console: Any) -> None:
+    packages = ", ".join(f"{name} {version}" for name, version in installed["packages"].items() if version)
+    threads = ", ".join(f"{name} {value}" for name, value in installed["threads"].items())
+    cache = installed["cache"]
     lines = (
-        f"{found['program']}, Python {found['python']}, {found['machine']}",
+        f"{installed['program']}, Python {installed['python']}, {installed['machine']}",
         f"packages: {packages}",
         f"threads: {threads}",
         f"compiled functions: {cache['folder'] or 'no cache'} ({cache['bytes'] / 1e6:.1f} MB)",
-        *(f"self-test: {one['test']}: {one['fault'] or 'as it should be'}" for one in found["self_test"]),
+        *(f"self-test: {one['test']}: {one['fault'] or 'as it should be'}" for one in installed["self_test"]),
     )
     for line in lines:
         console.print(line, highlight=False, markup=False)

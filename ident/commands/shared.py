@@ -100,16 +100,16 @@ _RESULTS = (".json", ".png", ".svg", ".pdf", ".html", ".gif", ".mp4")
 
 def inputs_kept(command: click.Command) -> click.Command:
     """The command, which refuses to write over what it reads before it begins."""
-    run = command.callback
-    assert run is not None
+    command_itself = command.callback
+    assert command_itself is not None
 
-    @functools.wraps(run)
+    @functools.wraps(command_itself)
     def kept(**values: Any) -> Any:
         from sim.files import inputs
 
         _refuse_inputs(command, values)
         inputs.begin()
-        return run(**values)
+        return command_itself(**values)
 
     command.callback = kept
     return command

@@ -70,12 +70,12 @@ def versions(db: str, json_path: str | None) -> None:
 
     import ident
 
-    found = ident.Database(db).to_dict()
+    history = ident.Database(db).to_dict()
     if json_path:
-        emit(found, json_path)
+        emit(history, json_path)
     if json_path != "-":
-        table = Table(*found[0])
-        for row in found:
+        table = Table(*history[0])
+        for row in history:
             table.add_row(*[on_screen(str(x)[:16] if k == "digest" else x) for k, x in row.items()])
         console_for().print(table)
 
@@ -99,18 +99,18 @@ def diff(first: int, second: int, db: str, figure: Path | None, json_path: str |
     from ident.report.difference import draw_difference
 
     versions = ident.Database(db)
-    found = versions[first].diff(versions[second])
+    difference = versions[first].diff(versions[second])
     if figure is not None:
-        draw_difference(found, figure, Path(db).name)
+        draw_difference(difference, figure, Path(db).name)
     if json_path:
-        emit(found.to_dict(), json_path)
+        emit(difference.to_dict(), json_path)
     if json_path == "-":
         return
-    if not found:
+    if not difference:
         click.echo(f"versions {first} and {second} hold the same coefficients")
         return
     table = Table("vehicle", "coefficient", "added", "removed", "changed", "largest change", "in standard errors")
-    for one in found:
+    for one in difference:
         change = f"{100 * one.largest_relative_change:.3g} %"
         counts = [str(n) for n in (one.added, one.removed, one.changed)]
         table.add_row(
@@ -135,12 +135,12 @@ def vacuum(db: str, wait: float, dry_run: bool, json_path: str | None) -> None:
     """
     from ident.database.leftovers import vacuum as run
 
-    found = run(db, wait, dry_run)
+    removed = run(db, wait, dry_run)
     if json_path != "-":
         verb = "would be removed" if dry_run else "removed"
-        for name, size in found.items():
+        for name, size in removed.items():
             click.echo(f"{verb}: {visible(name)} ({size} bytes)")
-        click.echo(f"{len(found)} files of commits that did not finish, {sum(found.values())} bytes")
+        click.echo(f"{len(removed)} files of commits that did not finish, {sum(removed.values())} bytes")
     if json_path:
-        files = [{"file": name, "bytes": size} for name, size in found.items()]
+        files = [{"file": name, "bytes": size} for name, size in removed.items()]
         emit({"database": db, "dry_run": dry_run, "files": files}, json_path)

@@ -207,9 +207,9 @@ class Expressions:
             return Value(f"((({a.text} % {b.text}) + {b.text}) % {b.text})", kind)
         if type(node.op) not in _OPERATIONS:
             raise self.fail(node, f"{type(node.op).__name__} is not translated")
-        sign, run = _OPERATIONS[type(node.op)]
+        sign, operation = _OPERATIONS[type(node.op)]
         if fixed:
-            return constant(run(a.kind.value, b.kind.value))
+            return constant(operation(a.kind.value, b.kind.value))
         return Value(f"({a.text} {sign} {b.text})", Number("i") if kind.kind == "b" else kind)
 
     def _unaryop(self, node: ast.UnaryOp) -> Value:
@@ -254,11 +254,11 @@ class Expressions:
         values = [self.number(n) for n in (node.left, *node.comparators)]
         parts = []
         for a, b, op in zip(values, values[1:], node.ops, strict=False):
-            sign, run = _COMPARISONS[type(op)]
+            sign, comparison = _COMPARISONS[type(op)]
             assert isinstance(a.kind, Number)
             assert isinstance(b.kind, Number)
             if a.kind.value is not None and b.kind.value is not None:
-                if not run(a.kind.value, b.kind.value):
+                if not comparison(a.kind.value, b.kind.value):
                     return constant(False)
                 continue
             parts.append(f"({a.text} {sign} {b.text})")

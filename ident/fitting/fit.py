@@ -251,9 +251,9 @@ def fit(
     return Results(done)
 
 
-def _measured(campaign: Campaign, found: Identification, measured_only: bool) -> pd.DataFrame:
+def _measured(campaign: Campaign, identified: Identification, measured_only: bool) -> pd.DataFrame:
     """What the runs alone give; nothing for a campaign without runs, which estimates may start from."""
-    return no_rows() if campaign.runs.empty and not measured_only else database_rows(found)
+    return no_rows() if campaign.runs.empty and not measured_only else database_rows(identified)
 
 
 def _relative_error(rows: pd.DataFrame) -> float | None:

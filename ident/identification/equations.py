@@ -133,8 +133,8 @@ class Runs:
         """(runs,) text of a column."""
         if column not in self._words:
             self._words[column] = self.table[column].to_numpy(object)
-        found: NDArray[np.object_] = self._words[column]
-        return found
+        chosen: NDArray[np.object_] = self._words[column]
+        return chosen
 
     def records(self, states: Indices) -> Iterator[tuple[int, dict[str, Any]]]:
         """The first run of each of some states, as number of the state and column -> value."""

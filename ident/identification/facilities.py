@@ -86,7 +86,7 @@ def between(left: Left, campaign: Sequence[str]) -> list[Between]:
     table["s"] = left.sigma
     shared = table.groupby(["o", "v"])["c"].transform("nunique") > 1
     table = table[shared & (table["p"] != 0.0) & (table["s"] > 0.0)]
-    found = []
+    spread = []
     for output, group in table.groupby("o", sort=False):
         weight = 1.0 / group["s"] ** 2
         sums = pd.DataFrame({"a": weight * group["r"] * group["p"], "b": weight * group["p"] ** 2})
@@ -99,22 +99,22 @@ def between(left: Left, campaign: Sequence[str]) -> list[Between]:
         spare = float(u.sum() - (u**2).sum() / u.sum())
         tau2 = max((q - (len(e) - 1)) / spare, 0.0) if spare > 0.0 else 0.0
         factors = {str(k): (float(x), float(y**-0.5)) for k, x, y in zip(per.index, e, u, strict=True)}
-        found.append(Between(str(output), tau2**0.5, factors, q / (len(e) - 1)))
-    return found
+        spread.append(Between(str(output), tau2**0.5, factors, q / (len(e) - 1)))
+    return spread
 
 
-def widened(runs: pd.DataFrame, left: Left, found: list[Between]) -> pd.DataFrame:
+def widened(runs: pd.DataFrame, left: Left, between_facilities: list[Between]) -> pd.DataFrame:
     """Runs with the error between facilities in the standard errors of their loads."""
-    tau = {one.output: one.tau for one in found if one.tau > 0.0}
+    tau = {one.output: one.tau for one in between_facilities if one.tau > 0.0}
     if not tau:
         return runs
     out = runs.copy()
     names = runs["campaign"].to_numpy(object)[left.run]
     count = pd.Series(1.0, index=range(len(left.run))).groupby([names, left.output, left.values]).transform("sum")
     for output, size in tau.items():
-        own = left.output == output
-        rows = left.run[own]
-        wide = np.sqrt(left.sigma[own] ** 2 + count.to_numpy()[own] * (size * left.fitted[own]) ** 2)
+        of_output = left.output == output
+        rows = left.run[of_output]
+        wide = np.sqrt(left.sigma[of_output] ** 2 + count.to_numpy()[of_output] * (size * left.fitted[of_output]) ** 2)
         errors = out[f"s_{output}"].to_numpy(dtype=float, copy=True)
         errors[rows] = wide
         out[f"s_{output}"] = errors

@@ -72,12 +72,12 @@ def _propulsion_point(solver: Solver, runs: pd.DataFrame) -> None:
     if "w_T" not in solver.by_name or speeds.empty:
         return
     first = speeds.iloc[0]
-    found = wake_fraction(solver, first)
-    if isinstance(found, str):
-        solver.skip(first, "n", found)
+    wake = wake_fraction(solver, first)
+    if isinstance(wake, str):
+        solver.skip(first, "n", wake)
         return
     term = solver.by_name["w_T"]
-    node = solver.append((term.name, term.part, ()), *found)
+    node = solver.append((term.name, term.part, ()), *wake)
     solver.nodes[node].runs.append(first["run_id"])
     solver.nodes[node].seen.add((term.part, ()))
     solver.nodes[node].qualities.append(first["quality"])
@@ -104,12 +104,12 @@ def identify(campaign: Campaign, tell: Tell = silent, spread: Spread = here) -> 
     """
     if not campaign.members:
         return _identify(campaign, tell, spread)[0]
-    found, left = _identify(campaign, tell, spread)
+    identified, left = _identify(campaign, tell, spread)
     apart = between(left, campaign.runs["campaign"].tolist())
     if any(one.tau > 0.0 for one in apart):
-        found, _ = _identify(replace(campaign, runs=widened(campaign.runs, left, apart)), tell, spread)
-        found = replace(found, campaign=campaign)
-    return replace(found, between=tuple(apart))
+        identified, _ = _identify(replace(campaign, runs=widened(campaign.runs, left, apart)), tell, spread)
+        identified = replace(identified, campaign=campaign)
+    return replace(identified, between=tuple(apart))
 
 
 def _identify(campaign: Campaign, tell: Tell, spread: Spread) -> tuple[Identification, Left]:
@@ -128,5 +128,7 @@ def _identify(campaign: Campaign, tell: Tell, spread: Spread) -> tuple[Identific
         solver.tables.clear()
         _propulsion_point(solver, campaign.runs.iloc[rows])
     tell("identifying", len(at), len(at))
-    found = Identification(campaign, solver.nodes, solver.values, solver.covariance, solver.unused, solver.warnings)
-    return found, together(solver.left)
+    identified = Identification(
+        campaign, solver.nodes, solver.values, solver.covariance, solver.unused, solver.warnings
+    )
+    return identified, together(solver.left)

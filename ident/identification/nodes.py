@@ -36,16 +36,16 @@ def key_point(values: Sequence[float]) -> Point:
 def vanishes(term: Term, part: str, vehicle: Vehicle) -> bool:
     """True for a coefficient that port/starboard symmetry makes zero at every point."""
     mirror = mirror_of(term, part, vehicle)
-    own = (mirror.name, mirror.part) == (term.name, part)
-    return own and mirror.sign < 0 and min(mirror.axis_signs, default=1) > 0
+    itself = (mirror.name, mirror.part) == (term.name, part)
+    return itself and mirror.sign < 0 and min(mirror.axis_signs, default=1) > 0
 
 
 def by_coefficient(nodes: Sequence[Node]) -> dict[tuple[str, str], list[int]]:
     """Numbers of the nodes of every coefficient and part, in order."""
-    found: dict[tuple[str, str], list[int]] = {}
+    places: dict[tuple[str, str], list[int]] = {}
     for i, node in enumerate(nodes):
-        found.setdefault((node.name, node.part), []).append(i)
-    return found
+        places.setdefault((node.name, node.part), []).append(i)
+    return places
 
 
 def table_points(

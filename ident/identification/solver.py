@@ -106,10 +106,10 @@ class Solver:
 
     def row(self, term: Term, part: str, features: dict[str, float]) -> dict[int, float] | None:
         """Weights of the nodes in a known term's coefficient at a state."""
-        found = self.table(term, part)
-        if found is None:
+        tabulated = self.table(term, part)
+        if tabulated is None:
             return None
-        table, nodes, signs = found
+        table, nodes, signs = tabulated
         shares = table.weights(axis_values(term, features)) * np.array(signs)
         row: dict[int, float] = {}
         for node, weight in zip(nodes, shares, strict=True):
@@ -125,19 +125,19 @@ class Solver:
         zero = {k: 0.0 if math.isnan(x) else x for k, x in given.items()}
         velocity = body_velocity(zero["U"], zero["alpha"], zero["beta"])
         rates = (zero["p"], zero["q"], zero["r"])
-        found = boat_features(velocity, rates, float(run["D0"]), float(run["n"]), float(run["J"]))
+        values = boat_features(velocity, rates, float(run["D0"]), float(run["n"]), float(run["J"]))
         if run["part"] in self.planes:
-            found |= plane_features(self.planes[run["part"]], velocity, rates, zero["plane"])
-        return found | {name: zero[name] for name in ACCELERATIONS}
+            values |= plane_features(self.planes[run["part"]], velocity, rates, zero["plane"])
+        return values | {name: zero[name] for name in ACCELERATIONS}
 
     def active(self, run: Run, output: str, features: dict[str, float]) -> list[tuple[Term, float]]:
         """Terms of the run's part that load this output in this state."""
-        found = []
+        active = []
         for term in self.loading.get((output, run["part"]), []):
             m = multiplier(term, features)
             if m != 0.0 and not math.isnan(m):
-                found.append((term, m))
-        return found
+                active.append((term, m))
+        return active
 
     def skip(self, run: Run, output: str, reason: str) -> None:
         """Note that a load of a run is not used, and why."""
@@ -211,9 +211,9 @@ class Solver:
                 notes.append(Note(output, run["reason"] or "excluded in the run file", unused=True))
                 continue
             make = self.load_form if output in OUTPUTS else self.direct_form
-            form, own = make(run, output, features)
+            form, said = make(run, output, features)
             forms += [form] if form.unknowns else []
-            notes += own
+            notes += said
         return forms, notes
 
     def equations(self, runs: Runs, rows: NDArray[np.int64]) -> Equations:
@@ -230,9 +230,11 @@ class Solver:
         notes: dict[int, list[Note]] = {}
         number = np.full((len(runs.first), len(MEASURED)), -1)
         for state, run in runs.records(states[order]):
-            own, said = self.forms(run)
-            number[state, [MEASURED.index(f.output) for f in own]] = np.arange(len(forms), len(forms) + len(own))
-            forms += own
+            of_state, said = self.forms(run)
+            number[state, [MEASURED.index(f.output) for f in of_state]] = np.arange(
+                len(forms), len(forms) + len(of_state)
+            )
+            forms += of_state
             if said:
                 notes[state] = said
         self._note(runs, rows, notes)
@@ -269,17 +271,17 @@ class Solver:
         sign = np.sign(equations.value)
         shared = runs.origins()[equations.run] * len(MEASURED) + equations.output
         loads = (equations.value, equations.sigma, sign, shared)
-        found = solve_stage(a, b, *loads, self.values, self.covariance, spread=spread)
-        for node in found.lost:
+        solution = solve_stage(a, b, *loads, self.values, self.covariance, spread=spread)
+        for node in solution.lost:
             bad = self.nodes[first + node]
             text = f"{bad.part} at {bad.point}: the runs cannot tell it from other terms; dropped"
             self.warnings.append((bad.name, text))
-        self.covariance = np.block([[self.covariance, found.cross.T], [found.cross, found.own]])
-        self.values = np.concatenate([self.values, found.values])
+        self.covariance = np.block([[self.covariance, solution.cross.T], [solution.cross, solution.covariance]])
+        self.values = np.concatenate([self.values, solution.values])
         if self.campaign.members:
-            self.left.append(self._left(equations, found.residual))
-        self._record(runs, equations, found.scores(equations.sigma), first)
-        self._forget(first, found.lost)
+            self.left.append(self._left(equations, solution.residual))
+        self._record(runs, equations, solution.scores(equations.sigma), first)
+        self._forget(first, solution.lost)
 
     def _left(self, equations: Equations, residual: Array) -> Left:
         """What the solution leaves of every load, with the values that it is an equation for."""
@@ -297,11 +299,11 @@ class Solver:
         ends = np.searchsorted(a.indices[order], np.arange(a.shape[1] + 1))
         names, qualities, kinds = (runs.words(c)[equations.run] for c in ("run_id", "quality", "test"))
         for k, (low, high) in enumerate(itertools.pairwise(ends)):
-            own, node = equation[low:high], self.nodes[first + k]
-            node.runs += names[own].tolist()
-            node.qualities += dict.fromkeys(qualities[own].tolist())
-            node.tests |= set(kinds[own].tolist())
-            node.worst = max(node.worst, float(scores[own].max(initial=0.0)))
+            lines, node = equation[low:high], self.nodes[first + k]
+            node.runs += names[lines].tolist()
+            node.qualities += dict.fromkeys(qualities[lines].tolist())
+            node.tests |= set(kinds[lines].tolist())
+            node.worst = max(node.worst, float(scores[lines].max(initial=0.0)))
         for i in np.flatnonzero(scores > 2.0).tolist():
             form = equations.forms[equations.form[i]]
             name = self.nodes[next(iter(form.unknowns))].name

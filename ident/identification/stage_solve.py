@@ -69,7 +69,7 @@ def gain_matrix(a: Matrix, weight: Array, spread: Spread = here) -> tuple[Matrix
     design = csr_array(a)
     design.eliminate_zeros()
     lost: list[int] = []
-    found: list[tuple[Indices, Indices, Array]] = []
+    operators: list[tuple[Indices, Indices, Array]] = []
     places: list[list[tuple[Indices, Indices]]] = []
 
     def shares() -> Iterator[tuple[list[tuple[Array, Array]]]]:
@@ -81,8 +81,8 @@ def gain_matrix(a: Matrix, weight: Array, spread: Spread = here) -> tuple[Matrix
         for (r, c), (operator, undetermined) in zip(places[number], solved, strict=True):
             lost += [int(c[k]) for k in undetermined]
             if operator is not None:
-                found.append((c, r, operator))
-    return _assembled(found, (design.shape[1], design.shape[0]), isinstance(a, np.ndarray)), lost
+                operators.append((c, r, operator))
+    return _assembled(operators, (design.shape[1], design.shape[0]), isinstance(a, np.ndarray)), lost
 
 
 def _together(blocks: Iterator[tuple[Indices, Indices, Array]]) -> Iterator[list[tuple[Indices, Indices, Array]]]:
@@ -126,9 +126,9 @@ def _blocks(design: csr_array) -> Iterator[tuple[Indices, Indices, Array]]:
     links = coo_array((np.ones(rows.size), (rows, n_rows + design.indices)), shape=(n_rows + n_columns,) * 2)
     count, label = connected_components(links, directed=False)
     members = []
-    for own in (label[:n_rows], label[n_rows:]):
-        order = np.argsort(own, kind="stable")
-        members.append(np.split(order, np.searchsorted(own[order], np.arange(1, count))))
+    for labels in (label[:n_rows], label[n_rows:]):
+        order = np.argsort(labels, kind="stable")
+        members.append(np.split(order, np.searchsorted(labels[order], np.arange(1, count))))
     place = np.zeros(n_columns, dtype=np.int64)
     # All equations in the order of their blocks: each block is a stretch of them.
     ordered = design[np.concatenate(members[0])] if members[0] else design
@@ -150,18 +150,18 @@ def _null_space(local: Array, rank: int) -> Array:
     return np.linalg.svd(square)[2][rank:]
 
 
-def _assembled(found: list[tuple[Indices, Indices, Array]], shape: tuple[int, int], full: bool) -> Matrix:
+def _assembled(operators: list[tuple[Indices, Indices, Array]], shape: tuple[int, int], full: bool) -> Matrix:
     """The blocks in one matrix."""
     if full:
         gain = np.zeros(shape)
-        for c, r, block in found:
+        for c, r, block in operators:
             gain[np.ix_(c, r)] = block
         return gain
-    if not found:
+    if not operators:
         return csr_array(shape)
-    rows = np.concatenate([np.repeat(c, r.size) for c, r, _ in found])
-    columns = np.concatenate([np.tile(r, c.size) for c, r, _ in found])
-    return csr_array((np.concatenate([block.ravel() for *_, block in found]), (rows, columns)), shape=shape)
+    rows = np.concatenate([np.repeat(c, r.size) for c, r, _ in operators])
+    columns = np.concatenate([np.tile(r, c.size) for c, r, _ in operators])
+    return csr_array((np.concatenate([block.ravel() for *_, block in operators]), (rows, columns)), shape=shape)
 
 
 @dataclass(frozen=True)
@@ -171,7 +171,7 @@ class Stage:
     Attributes
     ----------
     values : (new,) coefficients.
-    own : (new, new) their covariance.
+    covariance : (new, new) of them.
     cross : (new, old) their covariance with the values found before.
     lost : Those that the equations do not determine.
     residual : (equations,) what the values leave of each load.
@@ -179,7 +179,7 @@ class Stage:
     """
 
     values: Array
-    own: Array
+    covariance: Array
     cross: Array
     lost: list[int]
     residual: Array
@@ -250,5 +250,5 @@ def _errors(sigma: Array, sign: Array, shared: Indices) -> csr_array:
 
 
 def _full(matrix: Matrix) -> Array:
-    found: Array = matrix if isinstance(matrix, np.ndarray) else matrix.toarray()
-    return found
+    dense: Array = matrix if isinstance(matrix, np.ndarray) else matrix.toarray()
+    return dense

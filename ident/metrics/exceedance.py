@@ -43,38 +43,38 @@ class Exceedance:
     share: float
 
 
-def rice_rate(found: Statistics, level: float) -> float:
+def rice_rate(of: Statistics, level: float) -> float:
     """Crossings of a level a hour in one direction, of a Gaussian process (Rice 1944, 3.3-11).
 
     sqrt(m2/m0)/(2 pi) exp(-(level - mean)^2 / (2 m0)), with m0 of the record and m2 of its
     spectrum. Of a narrow-band process it is also the rate of maxima beyond the level (Rayleigh).
     """
-    away = (level - found.mean) / found.sigma
-    return _HOUR / found.rice_period * math.exp(-0.5 * away**2)
+    away = (level - of.mean) / of.sigma
+    return _HOUR / of.rice_period * math.exp(-0.5 * away**2)
 
 
-def exceedances(found: Statistics, levels: Sequence[float], side: Side = "below") -> list[Exceedance]:
+def exceedances(of: Statistics, levels: Sequence[float], side: Side = "below") -> list[Exceedance]:
     """How often a channel goes beyond levels: counted, and predicted by Rice.
 
     The sail top above a depth, broaching, is D0 ``below`` the level.
 
     Parameters
     ----------
-    found : Statistics of the channel.
+    of : Statistics of the channel.
     levels : In the channel's unit.
     side : Which side of the level is out.
     """
-    hours = (found.end - found.start) / _HOUR
+    hours = (of.end - of.start) / _HOUR
     sense = -1.0 if side == "below" else 1.0
-    series = found.trend + found.deviation
+    series = of.trend + of.deviation
     result = []
     for level in map(float, levels):
         beyond = sense * (series - level)
         count = int(upcrossings(beyond).size)
-        rate = rice_rate(found, level)
-        away = (level - found.mean) / found.sigma
+        rate = rice_rate(of, level)
+        away = (level - of.mean) / of.sigma
         # d ln(rate) = away / sigma d(mean) + away^2 / sigma d(sigma).
-        relative = math.hypot(away * found.mean_stderr, away**2 * found.sigma_stderr) / found.sigma
+        relative = math.hypot(away * of.mean_stderr, away**2 * of.sigma_stderr) / of.sigma
         result.append(
             Exceedance(
                 level=level,
@@ -90,7 +90,7 @@ def exceedances(found: Statistics, levels: Sequence[float], side: Side = "below"
     return result
 
 
-def extreme(found: Statistics, hours: float, side: Side = "below", risk: float = 0.01) -> dict[str, float]:
+def extreme(of: Statistics, hours: float, side: Side = "below", risk: float = 0.01) -> dict[str, float]:
     """The extreme of N hours of a Gaussian process by Rice's rate.
 
     With n = hours / zero-crossing period crossings: most probable mean +- sigma sqrt(2 ln n);
@@ -99,7 +99,7 @@ def extreme(found: Statistics, hours: float, side: Side = "below", risk: float =
 
     Parameters
     ----------
-    found : Statistics of the channel.
+    of : Statistics of the channel.
     hours : Duration N [h].
     side : ``below`` gives the lowest value.
     risk : Probability, between 0 and 1.
@@ -111,11 +111,11 @@ def extreme(found: Statistics, hours: float, side: Side = "below", risk: float =
     """
     if not 0.0 < risk < 1.0:
         raise InputError("extreme, risk", f"{risk:g}", "between 0 and 1")
-    n = hours * _HOUR / found.rice_period
+    n = hours * _HOUR / of.rice_period
     if not n > 3.0:
-        raise InputError("extreme, hours", f"{hours:g}", f"more than {3.0 * found.rice_period / _HOUR:.2g}")
+        raise InputError("extreme, hours", f"{hours:g}", f"more than {3.0 * of.rice_period / _HOUR:.2g}")
     sense = -1.0 if side == "below" else 1.0
     root = math.sqrt(2.0 * math.log(n))
     reduced = {"most_probable": root, "expected": root + _EULER / root}
     reduced["at_risk"] = math.sqrt(2.0 * math.log(max(n / -math.log1p(-risk), 1.0)))
-    return {k: found.mean + sense * found.sigma * v for k, v in reduced.items()} | {"hours": hours, "risk": risk}
+    return {k: of.mean + sense * of.sigma * v for k, v in reduced.items()} | {"hours": hours, "risk": risk}

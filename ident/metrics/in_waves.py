@@ -49,29 +49,29 @@ def in_waves(case: Case, simulation: Simulation) -> InWaves:
     return InWaves()
 
 
-def regular_waves(found: Mapping[str, Harmonics]) -> Metrics:
+def regular_waves(harmonics: Mapping[str, Harmonics]) -> Metrics:
     """First harmonics of depth over wave amplitude and of pitch, with means, of a flight in a regular wave."""
-    own = as_published(found)
+    published = as_published(harmonics)
     return {
-        "dz1_over_aw": own["dz1_over_aw"][0],
-        "theta1_deg": own["theta1"][0],
-        "dz1_over_aw_stderr": own["dz1_over_aw"][1],
-        "theta1_stderr_deg": own["theta1"][1],
-        "speed_mean_mps": found["D0"].encounter.speed,
-        "D0_mean_m": found["D0"].mean,
-        "theta_mean_deg": math.degrees(found["theta"].mean),
-        "frequency_of_encounter_radps": found["D0"].encounter.frequency,
+        "dz1_over_aw": published["dz1_over_aw"][0],
+        "theta1_deg": published["theta1"][0],
+        "dz1_over_aw_stderr": published["dz1_over_aw"][1],
+        "theta1_stderr_deg": published["theta1"][1],
+        "speed_mean_mps": harmonics["D0"].encounter.speed,
+        "D0_mean_m": harmonics["D0"].mean,
+        "theta_mean_deg": math.degrees(harmonics["theta"].mean),
+        "frequency_of_encounter_radps": harmonics["D0"].encounter.frequency,
     }
 
 
-def irregular_waves(found: Mapping[str, Statistics], simulation: Simulation) -> Metrics:
+def irregular_waves(statistics: Mapping[str, Statistics], simulation: Simulation) -> Metrics:
     """Significant values (double amplitude), least depths, and how often the sail top comes out a hour.
 
     The least depth is that of the whole record, start-up included; beside it the one that Rice's
     rate lets expect in as much time as the statistics are of and in three hours, and the one that
     is passed in three hours with 1 %.
     """
-    depth, pitch, roll = (found[name] for name in _CHANNELS)
+    depth, pitch, roll = (statistics[name] for name in _CHANNELS)
     broaching = exceedances(depth, [BROACHING])[0]
     record = extreme(depth, (depth.end - depth.start) / 3600.0)
     sea_state = extreme(depth, _HOURS, risk=_RISK)

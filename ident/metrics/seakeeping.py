@@ -117,21 +117,21 @@ class Harmonics:
 
     def as_json(self) -> dict[str, Any]:
         """Plain numbers and lists, all finite."""
-        own = {k: v.tolist() if isinstance(v, np.ndarray) else v for k, v in asdict(self).items()}
+        plain = {k: v.tolist() if isinstance(v, np.ndarray) else v for k, v in asdict(self).items()}
         value, error = self.transfer
-        return own | {"periods": self.periods, "transfer": value, "transfer_stderr": error}
+        return plain | {"periods": self.periods, "transfer": value, "transfer_stderr": error}
 
 
-def as_published(found: Mapping[str, Harmonics]) -> dict[str, tuple[float, float]]:
+def as_published(harmonics: Mapping[str, Harmonics]) -> dict[str, tuple[float, float]]:
     """``dz1_over_aw`` [-] and ``theta1`` [deg] with standard errors, of depth (D0 or z) and pitch."""
-    own: dict[str, tuple[float, float]] = {}
-    depth = found.get("D0", found.get("z"))
+    published: dict[str, tuple[float, float]] = {}
+    depth = harmonics.get("D0", harmonics.get("z"))
     if depth is not None:
-        own["dz1_over_aw"] = depth.transfer
-    if "theta" in found:
-        pitch = found["theta"]
-        own["theta1"] = math.degrees(pitch.amplitude[0]), math.degrees(pitch.amplitude_stderr[0])
-    return own
+        published["dz1_over_aw"] = depth.transfer
+    if "theta" in harmonics:
+        pitch = harmonics["theta"]
+        published["theta1"] = math.degrees(pitch.amplitude[0]), math.degrees(pitch.amplitude_stderr[0])
+    return published
 
 
 def channel_unit(channel: str) -> str:
@@ -233,9 +233,9 @@ def refined(encounter: Encounter, time: Array, values: Array, order: int = 1) ->
     first, last, middle = float(time[0]), float(time[-1]), float(time.mean())
     t, y = time[::step], values[::step] - values.mean(axis=0)
     y = y / np.where(np.ptp(y, axis=0) > 0.0, y.std(axis=0), 1.0)
-    half, found = math.pi / (last - first), encounter
+    half, better = math.pi / (last - first), encounter
     for _ in range(_STEPS):
-        x = _regressors(found, first, last, order)(t)
+        x = _regressors(better, first, last, order)(t)
         b = least_squares(x, y)[0]
         # dy/d(omega) = (t - middle) dy/d(Theta), of it what the linear coefficients leave.
         slope = np.zeros_like(y)
@@ -247,11 +247,11 @@ def refined(encounter: Encounter, time: Array, values: Array, order: int = 1) ->
         if size <= 0.0:
             return encounter
         change = float((slope * (y - x @ b)).sum()) / size
-        found = _at(found, found.frequency + change, middle)
-        if not abs(found.frequency - encounter.frequency) < half:
+        better = _at(better, better.frequency + change, middle)
+        if not abs(better.frequency - encounter.frequency) < half:
             return encounter
         if abs(change) < 1e-6 * half:
-            return found
+            return better
     return encounter
 
 
@@ -270,12 +270,12 @@ def _fit(encounter: Encounter, time: Array, values: Array, names: list[str], ord
 def _enough(encounter: Encounter, time: Array) -> None:
     periods = (time[-1] - time[0]) * encounter.frequency / (2.0 * math.pi)
     if not periods >= _FEWEST_PERIODS:
-        found = f"{periods:.2g} periods of {encounter.frequency:.3g} rad/s from {time[0]:.4g} to {time[-1]:.4g} s"
-        raise InputError("harmonics in waves", found, f"{_FEWEST_PERIODS:g} or more")
+        wrong = f"{periods:.2g} periods of {encounter.frequency:.3g} rad/s from {time[0]:.4g} to {time[-1]:.4g} s"
+        raise InputError("harmonics in waves", wrong, f"{_FEWEST_PERIODS:g} or more")
     samples = 2.0 * math.pi / encounter.frequency / float(np.diff(time).max())
     if samples < 2.0 * _HARMONICS + 2.0:
-        found = f"{samples:.2g} samples an encountered period"
-        raise InputError("harmonics in waves", found, f"{2 * _HARMONICS + 2} or more; a shorter record_s")
+        wrong = f"{samples:.2g} samples an encountered period"
+        raise InputError("harmonics in waves", wrong, f"{2 * _HARMONICS + 2} or more; a shorter record_s")
 
 
 def _one(name: str, unit: str, c: int, fit: Fitted, encounter: Encounter, order: int) -> Harmonics:
@@ -288,15 +288,15 @@ def _one(name: str, unit: str, c: int, fit: Fitted, encounter: Encounter, order:
     amplitude, phase, errors = np.zeros(_HARMONICS), np.zeros(_HARMONICS), np.zeros((2, _HARMONICS))
     for k in range(_HARMONICS):
         s, cosine = b[2 * k + 1 : 2 * k + 3]
-        own = covariance[2 * k + 1 : 2 * k + 3, 2 * k + 1 : 2 * k + 3]
+        block = covariance[2 * k + 1 : 2 * k + 3, 2 * k + 1 : 2 * k + 3]
         size = math.hypot(s, cosine)
         amplitude[k], phase[k] = size, math.atan2(-s, cosine)
         if size > 0.0:
             along, across = np.array([s, cosine]) / size, np.array([-cosine, s]) / size
-            errors[0, k] = math.sqrt(max(float(along @ own @ along), 2.0 * least))
-            errors[1, k] = min(math.sqrt(max(float(across @ own @ across), 2.0 * least)) / size, _ANY_PHASE)
+            errors[0, k] = math.sqrt(max(float(along @ block @ along), 2.0 * least))
+            errors[1, k] = min(math.sqrt(max(float(across @ block @ across), 2.0 * least)) / size, _ANY_PHASE)
         else:
-            errors[:, k] = math.sqrt(max(float(np.trace(own)) / 2.0, 2.0 * least)), _ANY_PHASE
+            errors[:, k] = math.sqrt(max(float(np.trace(block)) / 2.0, 2.0 * least)), _ANY_PHASE
     # The drift's mean over the window is zero, so that harmonic 0 is the mean of the rest.
     return Harmonics(
         channel=name,

@@ -256,7 +256,7 @@ def statistics_of(
     period, heights = zero_crossing(t, deviation)
     if heights.size < _FEWEST_CROSSINGS:
         raise InputError(f"statistics of {channel}", f"{heights.size} waves after the start-up", "a longer record")
-    own = spectrum(deviation, step, resolution)
+    density = spectrum(deviation, step, resolution)
     return Statistics(
         channel=channel,
         unit=unit,
@@ -272,9 +272,9 @@ def statistics_of(
         third_highest=float(np.sort(heights)[-max(1, heights.size // 3) :].mean()),
         waves=int(heights.size),
         period=period,
-        moments=own.moments(),
+        moments=density.moments(),
         effective=float(squares.effective[0]),
-        spectrum=own,
+        spectrum=density,
         time=t,
         deviation=deviation,
         trend=trend,

@@ -40,8 +40,8 @@ def circle_diameter(x: Array, y: Array) -> float:
     linear = np.linalg.lstsq(np.column_stack([x, y, np.ones_like(x)]), x**2 + y**2, rcond=None)[0]
     start = [linear[0] / 2.0, linear[1] / 2.0]
     start.append(float(np.sqrt(linear[2] + start[0] ** 2 + start[1] ** 2)))
-    found = least_squares(lambda c: np.hypot(x - c[0], y - c[1]) - c[2], start)
-    return float(2.0 * found.x[2])
+    circle = least_squares(lambda c: np.hypot(x - c[0], y - c[1]) - c[2], start)
+    return float(2.0 * circle.x[2])
 
 
 def _course(x: Array, y: Array) -> tuple[Array, Array, Array]:
@@ -103,27 +103,27 @@ def turning_circle(channels: Channels) -> Metrics:
     x, y = channels["x"] - channels["x"][0], channels["y"] - channels["y"][0]
     course, cx, cy = _course(x, y)
     side = 1.0 if course[-1] > 0.0 else -1.0
-    found = _reaches(side * course, cx, side * cy, "course")
+    metrics = _reaches(side * course, cx, side * cy, "course")
     place = crossing(side * course, np.pi)
     enough = place is not None and side * course[-1] >= 1.5 * np.pi
     beyond = slice(int(np.ceil(place or 0.0)) + 1, None)
-    found["steady_diameter_m"] = circle_diameter(x[beyond], y[beyond]) if enough else None
+    metrics["steady_diameter_m"] = circle_diameter(x[beyond], y[beyond]) if enough else None
     if "psi" in channels:
         turned = side * (channels["psi"] - channels["psi"][0])
-        found |= _reaches(turned, x, side * y, "heading")
+        metrics |= _reaches(turned, x, side * y, "heading")
         if "t" in channels:
             t = channels["t"] - channels["t"][0]
-            found["time_90_heading_s"] = at(t, crossing(turned, np.pi / 2.0))
-            found["time_180_heading_s"] = at(t, crossing(turned, np.pi))
+            metrics["time_90_heading_s"] = at(t, crossing(turned, np.pi / 2.0))
+            metrics["time_180_heading_s"] = at(t, crossing(turned, np.pi))
         if {"u", "v"} <= set(channels):
-            found |= _steady(channels, turned)
+            metrics |= _steady(channels, turned)
     if "phi" in channels:
-        found["heel_peak_deg"] = float(np.degrees(channels["phi"][np.argmax(np.abs(channels["phi"]))]))
+        metrics["heel_peak_deg"] = float(np.degrees(channels["phi"][np.argmax(np.abs(channels["phi"]))]))
     if "z" in channels:
-        found["depth_excursion_m"] = float(np.max(np.abs(channels["z"] - channels["z"][0])))
+        metrics["depth_excursion_m"] = float(np.max(np.abs(channels["z"] - channels["z"][0])))
     if "theta" in channels:
-        found["pitch_peak_deg"] = float(np.degrees(channels["theta"][np.argmax(np.abs(channels["theta"]))]))
-    return found
+        metrics["pitch_peak_deg"] = float(np.degrees(channels["theta"][np.argmax(np.abs(channels["theta"]))]))
+    return metrics
 
 
 def _before(channels: Channels, name: str, time: float, window: float) -> float:
@@ -174,15 +174,15 @@ def direct_spiral(channels: Channels, ends: list[tuple[float, float]]) -> tuple[
         return dict.fromkeys(("loop_height_degps", "loop_width_deg")), []
     points = [(float(np.degrees(dh)), float(np.degrees(_before(channels, "r", end, 5.0)))) for dh, end in ends]
     down, up = _branches(points)
-    found: Metrics = {}
+    metrics: Metrics = {}
     for name, branch in (("down", down), ("up", up)):
         if len(branch) > 1:
-            found |= {f"yaw_rate_{dh:+g}_deg_{name}_degps": float(r) for dh, r in branch}
+            metrics |= {f"yaw_rate_{dh:+g}_deg_{name}_degps": float(r) for dh, r in branch}
     heights = [float(np.interp(0.0, b[:, 0], b[:, 1])) if b[0, 0] <= 0.0 <= b[-1, 0] else None for b in (down, up)]
     zeros = [_zero(b[:, 0], b[:, 1]) for b in (down, up)]
-    found["loop_height_degps"] = _gap(heights)
-    found["loop_width_deg"] = _gap(zeros)
-    return found, [SpiralPoint(d, r) for d, r in points]
+    metrics["loop_height_degps"] = _gap(heights)
+    metrics["loop_width_deg"] = _gap(zeros)
+    return metrics, [SpiralPoint(d, r) for d, r in points]
 
 
 def _gap(pair: list[float | None]) -> float | None:
@@ -218,12 +218,12 @@ def reverse_spiral(channels: Channels, ends: list[tuple[float, float]]) -> tuple
         return dict.fromkeys(("slope_at_zero_deg_per_degps", "loop_width_deg")), []
     points = [(float(np.degrees(r)), float(np.degrees(_before(channels, "dH", end, 30.0)))) for r, end in ends]
     rate, rudder = np.array(sorted(points)).T
-    found: Metrics = {f"rudder_{r:+g}_degps_deg": d for r, d in sorted(points)}
+    metrics: Metrics = {f"rudder_{r:+g}_degps_deg": d for r, d in sorted(points)}
     i = int(np.clip(np.searchsorted(rate, 0.0), 1, len(rate) - 1))
     low, high = (i - 1, i) if rate[i] != 0.0 or i + 1 >= len(rate) else (i - 1, i + 1)
-    found["slope_at_zero_deg_per_degps"] = float((rudder[high] - rudder[low]) / (rate[high] - rate[low]))
-    found["loop_width_deg"] = float(np.max(np.maximum.accumulate(rudder) - rudder))
-    return found, [SpiralPoint(d, r) for r, d in points]
+    metrics["slope_at_zero_deg_per_degps"] = float((rudder[high] - rudder[low]) / (rate[high] - rate[low]))
+    metrics["loop_width_deg"] = float(np.max(np.maximum.accumulate(rudder) - rudder))
+    return metrics, [SpiralPoint(d, r) for r, d in points]
 
 
 def pull_out(channels: Channels, ends: list[tuple[float, float]]) -> Metrics:
@@ -240,19 +240,19 @@ def pull_out(channels: Channels, ends: list[tuple[float, float]]) -> Metrics:
     end of the pull-out. ``residual_difference_degps``: between the first two; a boat that is
     straight-line stable comes to one rate from both sides, zero.
     """
-    found: Metrics = {}
+    metrics: Metrics = {}
     turns = residuals = 0
     for dh, end in ends:
         rate = float(np.degrees(_before(channels, "r", end, 5.0)))
         if dh != 0.0:
             turns += 1
-            found[f"turn_{turns}_degps"] = rate
+            metrics[f"turn_{turns}_degps"] = rate
         else:
             residuals += 1
-            found[f"residual_{residuals}_degps"] = rate
-    pair = [found.get("residual_1_degps"), found.get("residual_2_degps")]
-    found["residual_difference_degps"] = _gap(pair)
-    return found
+            metrics[f"residual_{residuals}_degps"] = rate
+    pair = [metrics.get("residual_1_degps"), metrics.get("residual_2_degps")]
+    metrics["residual_difference_degps"] = _gap(pair)
+    return metrics
 
 
 def stopping(channels: Channels, stopped: bool) -> Metrics:

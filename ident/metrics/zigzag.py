@@ -56,7 +56,7 @@ def legs(t: Array, angle: Array, check: float, sense: int) -> list[Leg]:
     -------
     The legs in order; the last may be incomplete.
     """
-    found: list[Leg] = []
+    swings: list[Leg] = []
     start = 0
     while start < len(t):
         x = sense * angle
@@ -72,9 +72,9 @@ def legs(t: Array, angle: Array, check: float, sense: int) -> list[Leg]:
         top = i + int(np.argmax(x[i:end]))
         reached = top < len(t) - 1
         peak_time, peak = _extremum(t, x, top) if reached else (None, None)
-        found.append(Leg(sense, crossing, peak, peak_time))
+        swings.append(Leg(sense, crossing, peak, peak_time))
         sense, start = -sense, end
-    return found
+    return swings
 
 
 def zigzag(
@@ -96,17 +96,17 @@ def zigzag(
     check). ``period_s``: second to fourth execute. ``peak_<name>_rate_k_degps``: largest
     rate on the k-th leg. None where the record ends before.
     """
-    found = legs(t, angle, check, sense)
+    swings = legs(t, angle, check, sense)
     metrics: dict[str, float | None] = {}
     for k in range(3):
-        leg = found[k] if k < len(found) else None
+        leg = swings[k] if k < len(swings) else None
         peak = np.degrees(leg.peak - check) if leg and leg.peak is not None else None
         metrics[f"overshoot_{k + 1}_deg"] = peak
         metrics[f"execute_{k + 2}_s"] = leg.check if leg else None
     first, third = metrics["execute_2_s"], metrics["execute_4_s"]
     metrics["period_s"] = third - first if first is not None and third is not None else None
     if rate is not None:
-        bounds = [float(t[0]), *[leg.check for leg in found if leg.check is not None]]
+        bounds = [float(t[0]), *[leg.check for leg in swings if leg.check is not None]]
         for k in range(3):
             value = None
             if k + 1 < len(bounds):

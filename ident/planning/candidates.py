@@ -115,16 +115,16 @@ def campaign_levels(campaign: Campaign) -> dict[str, Levels]:
     towed = runs[(runs["U"] > 0.0) & along & (runs["part"] == "hull")]
     speed = float(towed["U"].max()) if len(towed) else 1.0
     rate = _largest_rate(towed, length) or defaults()["rate"][0]
-    own = dict(iter(runs.groupby("test")))
-    found = {}
+    by_test = dict(iter(runs.groupby("test")))
+    levels_of = {}
     for test in planned_tests():
-        group = own.get(test, runs)
+        group = by_test.get(test, runs)
         depths = group["D0"] if group["D0"].notna().any() else runs["D0"]
         depth = float(depths.max()) if depths.notna().any() else defaults()["depth"][0] * length
         levels = {"speed_mps": [] if test == "pure_rotation" else [speed], "depth_m": [depth]}
         levels |= {f"{a}_deg": _levels(np.rad2deg(towed[a].abs())) for a in ("alpha", "beta")}
         if test in ("pure_rotation", "rotating_arm", "propeller_side_force"):
-            still = own.get("pure_rotation", runs.iloc[:0]) if test == "pure_rotation" else towed
+            still = by_test.get("pure_rotation", runs.iloc[:0]) if test == "pure_rotation" else towed
             turned = _top(still, RATES) if test == "pure_rotation" else 0.0
             levels |= {f"{k}_radps": _levels(still[k].abs(), turned or rate * speed / length) for k in RATES}
         planes = [p.limit_deg for p in campaign.vehicle.planes]
@@ -132,8 +132,8 @@ def campaign_levels(campaign: Campaign) -> dict[str, Levels]:
         if test == "acceleration":
             levels["linear_mps2"] = [float(_top(group, ("udot", "vdot", "wdot")) or speed**2 / length)]
             levels["angular_radps2"] = [float(_top(group, ("pdot", "qdot", "rdot")) or (speed / length) ** 2)]
-        found[test] = Levels(**levels)
-    return found
+        levels_of[test] = Levels(**levels)
+    return levels_of
 
 
 def _top(runs: pd.DataFrame, columns: tuple[str, ...]) -> float:

@@ -130,14 +130,14 @@ class Plan:
                 "coefficient": name,
                 "part": part,
                 "why": why,
-                "values": len(own),
-                "tests": list(own[0].tests),
-                "size": own[0].size,
-                "now": _worst(n.now for n in own),
-                "planned": _worst(n.planned for n in own),
-                "reached": all(n.planned <= self.target * (1.0 + 1e-6) for n in own),
+                "values": len(needs),
+                "tests": list(needs[0].tests),
+                "size": needs[0].size,
+                "now": _worst(n.now for n in needs),
+                "planned": _worst(n.planned for n in needs),
+                "reached": all(n.planned <= self.target * (1.0 + 1e-6) for n in needs),
             }
-            for (name, part, why), own in groups.items()
+            for (name, part, why), needs in groups.items()
         ]
 
 

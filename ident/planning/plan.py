@@ -103,14 +103,14 @@ class _Problem:
         if place in self.stderr:
             wanted = (name, part) in self.poor and self.stderr[place] > self.target * self.size(term, part)
             return "standard error" if wanted else ""
-        own = [p for n, q, p in self.solver.index if (n, q) == (name, part)]
-        if not own:
+        points = [p for n, q, p in self.solver.index if (n, q) == (name, part)]
+        if not points:
             return "no run"
         if gap != "value":
             return gap
         for k, axis in enumerate(term.axes):
             moving = axis not in ("U", "alpha", "beta", "delta", "D0", "J", "sgn(w)")
-            if moving and abs(point[k]) > max(abs(p[k]) for p in own) * (1.0 + 1e-6):
+            if moving and abs(point[k]) > max(abs(p[k]) for p in points) * (1.0 + 1e-6):
                 return f"{axis} beyond the runs"
         return ""
 
@@ -292,14 +292,14 @@ def _untestable(problem: _Problem) -> dict[str, tuple[str, ...]]:
     """Terms without a value that no candidate reaches."""
     vehicle = problem.campaign.vehicle
     reached = {p[:2] for p in (*problem.needs, *problem.solver.index)}
-    found = {}
+    untestable = {}
     for term in (t for t in vehicle_terms(vehicle) if t.tests):
         keys = [problem.solver.mirrors[term.name, part] for part in parts_of(term, vehicle)]
-        own = {(term.name, part) for part in parts_of(term, vehicle)} | {(m.name, m.part) for m in keys}
+        terms_of = {(term.name, part) for part in parts_of(term, vehicle)} | {(m.name, m.part) for m in keys}
         idle = all(vanishes(term, part, vehicle) for part in parts_of(term, vehicle))
-        if not idle and not own & reached:
-            found[term.name] = term.tests
-    return found
+        if not idle and not terms_of & reached:
+            untestable[term.name] = term.tests
+    return untestable
 
 
 def planned_campaign(campaign: Campaign, runs: pd.DataFrame) -> Campaign:

@@ -94,7 +94,7 @@ def _panels(term: Term, rows: pd.DataFrame) -> list[tuple[str, Panel]]:
     """Panels of one tabulated coefficient, with the abscissa that decides the figure."""
     varying = _varying(term, rows)
     free = [a for a in varying if a not in ("U", "D0")]
-    found = []
+    panels = []
     for x in free or (["D0"] if "D0" in varying else [term.axes[0]]):
         # Along one axis the others stand at zero: the runs of a pure motion.
         others = [_column(a) for a in free if a != x]
@@ -105,28 +105,31 @@ def _panels(term: Term, rows: pd.DataFrame) -> list[tuple[str, Panel]]:
             line = "D0" if "D0" in varying else None
             for speed, part in along.groupby(_column("U")):
                 head = f"{title}   U = {float(str(speed)):.4g} m/s"
-                found.append((x, Panel(head, term.name, x, line, float(str(speed)), part)))
+                panels.append((x, Panel(head, term.name, x, line, float(str(speed)), part)))
         else:
-            found.append(("", Panel(title, term.name, x, line, None, along)))
-    return found
+            panels.append(("", Panel(title, term.name, x, line, None, along)))
+    return panels
 
 
 def _constants(terms: Sequence[Term], rows: pd.DataFrame) -> list[tuple[Term, str, Panel]]:
     """Panels of coefficients without axes: bars over the parts, or over the symbols."""
-    found = []
+    panels = []
     by_key: dict[tuple[str, str, str], list[Term]] = {}
     for term in terms:
-        own = term.name if term.part == "section" or not term.output else ""
-        by_key.setdefault((term.group, term.output, own), []).append(term)
-    for (_, output, own), members in by_key.items():
+        symbol = term.name if term.part == "section" or not term.output else ""
+        by_key.setdefault((term.group, term.output, symbol), []).append(term)
+    for (_, output, symbol), members in by_key.items():
         part = rows[rows["coefficient"].isin([t.name for t in members])]
-        if own:
-            head, labels = f"{own}   {equations(members[0])}", "part" if members[0].part == "section" else "coefficient"
+        if symbol:
+            head, labels = (
+                f"{symbol}   {equations(members[0])}",
+                "part" if members[0].part == "section" else "coefficient",
+            )
         else:
             numbers = dict.fromkeys(n for t in members for n in t.equation.split())
             head, labels = f"{output}   Eq. {', '.join(numbers)}", "coefficient"
-        found.append((members[0], "", Panel(head, own or output, None, None, None, part, labels)))
-    return found
+        panels.append((members[0], "", Panel(head, symbol or output, None, None, None, part, labels)))
+    return panels
 
 
 def _group(terms: Sequence[Term], rows: pd.DataFrame) -> dict[tuple[str, str, str], list[Panel]]:
@@ -134,8 +137,8 @@ def _group(terms: Sequence[Term], rows: pd.DataFrame) -> dict[tuple[str, str, st
     figures: dict[tuple[str, str, str], list[Panel]] = {}
     tabulated = [t for t in terms if t.axes]
     for term in tabulated:
-        own = rows[rows["coefficient"] == term.name]
-        for part, group in own.groupby("part", sort=False):
+        of_term = rows[rows["coefficient"] == term.name]
+        for part, group in of_term.groupby("part", sort=False):
             for x, panel in _panels(term, group):
                 figures.setdefault((term.group, str(part), x), []).append(panel)
     present = set(rows["coefficient"])
@@ -150,7 +153,7 @@ def _line_values(panels: list[Panel]) -> dict[str, list[float]]:
     for panel in panels:
         if panel.line:
             values.setdefault(panel.line, set()).update(panel.rows[_column(panel.line)])
-    return {axis: sorted(found) for axis, found in values.items()}
+    return {axis: sorted(at) for axis, at in values.items()}
 
 
 def _shade(i: int, count: int) -> str:

@@ -42,10 +42,10 @@ _MANY_RUNS = 40
 def _stored(metadata: dict[str, str], key: str, default: Any) -> Any:
     """A JSON value of the commit, or ``default`` when it is missing or damaged."""
     try:
-        found = json.loads(metadata.get(key, ""))
+        stored = json.loads(metadata.get(key, ""))
     except ValueError:
         return default
-    return found if isinstance(found, type(default)) else default
+    return stored if isinstance(stored, type(default)) else default
 
 
 def _time(stamp: str) -> str:
@@ -84,7 +84,7 @@ def _provenance(db: str, number: int, commit: Version, vehicle: Vehicle) -> list
 
 def _ranges(term: Term, rows: pd.DataFrame) -> list[str]:
     """What the runs cover along each axis, in database units."""
-    found = []
+    ranges = []
     for name in term.axes:
         axis = catalogue.axes()[name]
         values = sorted(rows[axis.column].unique())
@@ -95,8 +95,8 @@ def _ranges(term: Term, rows: pd.DataFrame) -> list[str]:
             text = ", ".join(_figure(v) for v in values) + unit
         else:
             text = f"{_figure(values[0])} to {_figure(values[-1])}{unit} ({len(values)})"
-        found.append(f"{name}: {text}")
-    return found
+        ranges.append(f"{name}: {text}")
+    return ranges
 
 
 def _notes(term: Term, rows: pd.DataFrame) -> list[str]:
@@ -117,35 +117,35 @@ def _notes(term: Term, rows: pd.DataFrame) -> list[str]:
 
 def _coverage(vehicle: Vehicle, rows: pd.DataFrame, factors: dict[str, float]) -> list[dict[str, Any]]:
     """One row a term of the vehicle's set, with data or absent."""
-    found = []
+    coverage = []
     for term in vehicle_terms(vehicle):
-        own = rows[rows["coefficient"] == term.name]
+        of_term = rows[rows["coefficient"] == term.name]
         parts = parts_of(term, vehicle)
         row: dict[str, Any] = {
             "symbol": term.name,
             "group": term.group,
-            "part": parts[0] if len(parts) == 1 else f"{own['part'].nunique()} of {len(parts)} sections",
+            "part": parts[0] if len(parts) == 1 else f"{of_term['part'].nunique()} of {len(parts)} sections",
             "equation": equations(term),
             "multiplier": term.multiplier or "1",
             "tests": " ".join(term.tests),
-            "absent": own.empty,
+            "absent": of_term.empty,
         }
-        if not own.empty:
-            origin = own["origin"].value_counts()
-            words = sorted({q for q in own["quality"] if q}, key=lambda q: factors.get(q, 0.0))
+        if not of_term.empty:
+            origin = of_term["origin"].value_counts()
+            words = sorted({q for q in of_term["quality"] if q}, key=lambda q: factors.get(q, 0.0))
             row |= {
                 "measured": int(origin.get("measured", 0) + origin.get("published", 0)),
                 "mirror": int(origin.get("mirror", 0)),
                 "symmetry": int(origin.get("symmetry", 0)),
-                "ranges": _ranges(term, own),
+                "ranges": _ranges(term, of_term),
                 "quality": words[-1] if words else "",
-                "worst_points": int((own["quality"] == words[-1]).sum()) if words else 0,
-                "worst": float(own["worst_residual"].max()),
+                "worst_points": int((of_term["quality"] == words[-1]).sum()) if words else 0,
+                "worst": float(of_term["worst_residual"].max()),
                 "rules": [f"{a}: {r}" for a, r in term.extrapolation.items()],
-                "notes": _notes(term, own),
+                "notes": _notes(term, of_term),
             }
-        found.append(row)
-    return found
+        coverage.append(row)
+    return coverage
 
 
 def _signs(coefficients: Coefficients, rows: pd.DataFrame) -> dict[str, Any]:
@@ -156,11 +156,11 @@ def _signs(coefficients: Coefficients, rows: pd.DataFrame) -> dict[str, Any]:
         # Constant coefficients have the same derivatives at every speed and depth.
         speed, depth = 1.0, 0.0
     if speed > 0.0:
-        found = derivatives(coefficients, _UNIT, speed, 0.0 if depth != depth else depth)
+        signs = derivatives(coefficients, _UNIT, speed, 0.0 if depth != depth else depth)
     else:
-        found = []
+        signs = []
     sources = list(dict.fromkeys(c.source for c in checks() if c.suboff is not None))
-    return {"speed": speed, "depth": depth, "rows": found, "passed": sum(d.ok for d in found), "sources": sources}
+    return {"speed": speed, "depth": depth, "rows": signs, "passed": sum(d.ok for d in signs), "sources": sources}
 
 
 def _vocabulary(metadata: dict[str, str], rows: pd.DataFrame) -> list[dict[str, Any]]:
@@ -185,12 +185,12 @@ def _calibration(commit: Version, vehicle: Vehicle, number: int) -> dict[str, An
     from ident.calibration.figure import prior_and_posterior
     from ident.calibration.result import Group
 
-    found = _stored(commit.metadata, "calibration", {})
-    if not found:
+    stored = _stored(commit.metadata, "calibration", {})
+    if not stored:
         return None
     stamp = f"{vehicle.name}, database version {number}; program frame: {PROGRAM}"
-    groups = [g | {"verdict": Group.of(g).verdict} for g in found["groups"]]
-    return found | {"groups": groups, "figure": prior_and_posterior(found, stamp)}
+    groups = [g | {"verdict": Group.of(g).verdict} for g in stored["groups"]]
+    return stored | {"groups": groups, "figure": prior_and_posterior(stored, stamp)}
 
 
 _ERRATA = ("equation", "printed", "corrected", "consequence")

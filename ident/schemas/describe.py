@@ -48,14 +48,14 @@ class Key:
 
 def meanings(model: type[BaseModel]) -> dict[str, str]:
     """Key -> meaning, from the section Attributes of a model's docstring and those it extends."""
-    found: dict[str, str] = {}
+    meaning: dict[str, str] = {}
     for one in reversed(model.__mro__):
         section = re.search(r"Attributes\n\s*-+\n(.*)\Z", one.__doc__ or "", re.DOTALL)
         if not (section and issubclass(one, BaseModel)):
             continue
         for names, text in re.findall(r"^ {4}(\w[\w, ]*) : (.*(?:\n {8}.*)*)", section[1], re.MULTILINE):
-            found |= {name.strip(): " ".join(text.split()) for name in names.split(",")}
-    return found
+            meaning |= {name.strip(): " ".join(text.split()) for name in names.split(",")}
+    return meaning
 
 
 def models_in(annotation: Any) -> list[type[BaseModel]]:
@@ -66,11 +66,11 @@ def models_in(annotation: Any) -> list[type[BaseModel]]:
 
 
 def _every_model(model: type[BaseModel]) -> dict[str, type[BaseModel]]:
-    found = {model.__name__: model}
+    models = {model.__name__: model}
     for field in model.model_fields.values():
         for inner in models_in(field.annotation):
-            found |= _every_model(inner)
-    return found
+            models |= _every_model(inner)
+    return models
 
 
 def schema(kind: str) -> dict[str, Any]:
@@ -99,14 +99,14 @@ def schema(kind: str) -> dict[str, Any]:
     """
     if kind not in KINDS:
         raise InputError("schema", repr(kind), ", ".join(KINDS))
-    found = KINDS[kind].model_json_schema()
+    whole = KINDS[kind].model_json_schema()
     for name, model in _every_model(KINDS[kind]).items():
-        part = found if model is KINDS[kind] else found["$defs"][name]
+        part = whole if model is KINDS[kind] else whole["$defs"][name]
         part["description"] = " ".join((model.__doc__ or "").split("\n\n")[0].split())
         for key, text in meanings(model).items():
             if key in part["properties"]:
                 part["properties"][key]["description"] = text
-    return {"$schema": _DIALECT, **found}
+    return {"$schema": _DIALECT, **whole}
 
 
 def keys(kind: str) -> list[Key]:
@@ -117,7 +117,7 @@ def keys(kind: str) -> list[Key]:
 def _keys(model: type[BaseModel], table: str, many: bool) -> list[Key]:
     told = meanings(model)
     shown = f"[[{table}]]" if many else f"[{table}]" if table else ""
-    found, below = [], []
+    listed, below = [], []
     for name, field in model.model_fields.items():
         default = None
         if not field.is_required():
@@ -125,15 +125,15 @@ def _keys(model: type[BaseModel], table: str, many: bool) -> list[Key]:
             default = (
                 "" if value is None or value is PydanticUndefined or isinstance(value, BaseModel) else _toml(value)
             )
-        found.append(Key(shown, name, _words(field.annotation), default, told.get(name, "")))
+        listed.append(Key(shown, name, _words(field.annotation), default, told.get(name, "")))
         for inner in models_in(field.annotation):
             # Numbers with unit and source are written in one line and explained once.
             if inner.__name__ in _INLINE:
                 continue
-            listed = "list" in str(field.annotation)
+            repeated = "list" in str(field.annotation)
             named = ".NAME" if "dict" in str(field.annotation) else ""
-            below += _keys(inner, f"{table}.{name}{named}".strip("."), listed)
-    return found + below
+            below += _keys(inner, f"{table}.{name}{named}".strip("."), repeated)
+    return listed + below
 
 
 _INLINE = ("Number", "Triple", "Limits", "Mixer")
@@ -147,23 +147,23 @@ def _toml(value: Any) -> str:
 
 def _words(annotation: Any) -> str:
     """What a key takes, in words."""
-    found = str(annotation)
-    literals = re.findall(r"Literal\[(.*?)\]", found)
+    text_of_type = str(annotation)
+    literals = re.findall(r"Literal\[(.*?)\]", text_of_type)
     if literals:
         allowed = [w for w in re.findall(r"'([^']*)'", literals[0]) if w]
         plain = " or ".join(w if w[0].isalnum() else f'"{w}"' for w in allowed)
-        return plain + (" (list)" if found.startswith("list") else "")
+        return plain + (" (list)" if text_of_type.startswith("list") else "")
     inner = models_in(annotation)
     if inner and inner[0].__name__ in _INLINE:
         return {"Number": "{ value, unit, source }", "Mixer": "{ dV, dH }"}.get(
             inner[0].__name__, "{ value = [...], unit, source }"
         )
     if inner:
-        return "tables" if "list" in found else "table of tables" if "dict" in found else "table"
+        return "tables" if "list" in text_of_type else "table of tables" if "dict" in text_of_type else "table"
     for text, words in (("dict", "table"), ("list[str]", "list of texts"), ("list", "list of numbers")):
-        if text in found:
+        if text in text_of_type:
             return words
     for kind, words in (("bool", "true or false"), ("int", "whole number"), ("float", "number")):
-        if kind in found:
+        if kind in text_of_type:
             return words
     return "text"

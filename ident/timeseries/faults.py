@@ -149,10 +149,10 @@ class Usual:
             if len(column) > channel.longest:
                 marks["stuck"] = _stuck(column, channel) & ~known
             for kind, mark in marks.items():
-                found = mark[inside]
-                if found.any():
-                    self.counts[kind, name] += int(found.sum())
-                    bad |= found
+                faulty = mark[inside]
+                if faulty.any():
+                    self.counts[kind, name] += int(faulty.sum())
+                    bad |= faulty
         return bad
 
 

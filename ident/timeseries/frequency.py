@@ -42,8 +42,8 @@ def _left(frequency: float, time: Array, value: Array, weight: Array) -> float:
     angle = 2.0 * math.pi * frequency * time
     x = np.column_stack([np.ones(time.size), *(f(k * angle) for k in (1, 2, 3) for f in (np.sin, np.cos))])
     root = np.sqrt(weight)[:, None]
-    found = np.linalg.lstsq(x * root, value * root[:, 0], rcond=None)[0]
-    residual = (value - x @ found) * root[:, 0]
+    solution = np.linalg.lstsq(x * root, value * root[:, 0], rcond=None)[0]
+    residual = (value - x @ solution) * root[:, 0]
     return float(residual @ residual)
 
 
@@ -70,12 +70,12 @@ def estimate(time: Array, values: Array, weight: Array, near: float | None) -> L
     span = float(t[-1] - t[0]) if t.size else 0.0
     if t.size < _FEWEST or span <= 0.0 or (near is not None and near * span < 2.0):
         return None
-    found = None
+    best = None
     for c in range(y.shape[1]):
         one = _channel(t, y[:, c], w, span, near, c)
-        if one is not None and one.share > _LINE and (found is None or one.share > found.share):
-            found = one
-    return found
+        if one is not None and one.share > _LINE and (best is None or one.share > best.share):
+            best = one
+    return best
 
 
 def _channel(t: Array, y: Array, w: Array, span: float, near: float | None, c: int) -> Line | None:

@@ -214,8 +214,8 @@ def _covariance(x: Array, residual: Array, weight: Array) -> tuple[Array, float]
     levels = [(x, residual, weight)]
     while (coarse := _coarser(*levels[-1])) is not None:
         levels = [levels[-1], coarse]
-    found = [_covariance_at(*level) for level in levels]
-    covariance, of_mean = max(found, key=lambda f: float(np.trace(x.T @ (weight[:, None] * x) @ f[0])))
+    at_levels = [_covariance_at(*level) for level in levels]
+    covariance, of_mean = max(at_levels, key=lambda f: float(np.trace(x.T @ (weight[:, None] * x) @ f[0])))
     w = weight / weight.mean()
     scatter = float((w * residual**2).sum()) / (len(w) - x.shape[1])
     return covariance, scatter / of_mean if of_mean > 0.0 else float(len(w))
@@ -305,14 +305,14 @@ def fit_history(condensed: Condensed, loads: list[str], transient: bool = True) 
     residuals = ys - centre - xs @ values
     # Scatter at the level of rounding is none.
     residuals[:, np.abs(residuals).max(axis=0) <= 1e-13 * np.abs(ys).max(axis=0)] = 0.0
-    found = [_covariance(xs, residuals[:, c], w) for c in range(y.shape[1])]
-    effective = np.array([e for _, e in found])
+    errors = [_covariance(xs, residuals[:, c], w) for c in range(y.shape[1])]
+    effective = np.array([e for _, e in errors])
     words = _verdict(residuals, t, effective, loads, ys, cut >= int(_SHARE * n) - max(1, n // _CUTS) > 0)
     # The constant is the first regressor of every fit, averaged to one.
     values[0] += centre
     return Fitted(
         values,
-        np.array([c for c, _ in found]),
+        np.array([c for c, _ in errors]),
         float(t[0]),
         float(t[-1]),
         cut > 0,

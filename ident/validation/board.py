@@ -192,11 +192,11 @@ class Scoreboard:
             published = [c.error.published_model_rmse for c in rated]
             return geometric_mean([e / p for e, p in zip(errors, published, strict=True) if e and p])
 
-        own, parent = [c.error.rmse for c in rated], [c.parent_rmse for c in rated]
+        of_version, parent = [c.error.rmse for c in rated], [c.parent_rmse for c in rated]
         return ByVersion(
             measured_only=mean([c.measured_only_rmse for c in rated]),
-            predicted=mean(parent if calibrated else [*own]),
-            calibrated=mean([*own]) if calibrated else None,
+            predicted=mean(parent if calibrated else [*of_version]),
+            calibrated=mean([*of_version]) if calibrated else None,
         )
 
     @property

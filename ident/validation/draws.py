@@ -99,8 +99,8 @@ def _block(members: Places, correlation: Array, least: float) -> Block:
         columns.append(column)
     rest = rest[np.ix_(left, left)]
     if rest.size and np.abs(rest).max() > _REFUSED:
-        found = f"off by {np.abs(rest).max():.2g} from any positive semidefinite matrix"
-        raise InputError(f"correlations of {members.size} values", found, "correlations as a fit writes them")
+        wrong = f"off by {np.abs(rest).max():.2g} from any positive semidefinite matrix"
+        raise InputError(f"correlations of {members.size} values", wrong, "correlations as a fit writes them")
     return Block(members, members[pivots], np.stack(columns, axis=1))
 
 
@@ -146,15 +146,15 @@ def scores(draws: Array, correlation: Array) -> Array:
     -------
     (samples, rank), by forward substitution in each block's factor.
     """
-    found: list[Array] = []
+    independent: list[Array] = []
     for block in factor(correlation, _SCORED):
         place = {int(member): row for row, member in enumerate(block.members)}
-        own: list[Array] = []
+        of_block: list[Array] = []
         for k, pivot in enumerate(block.pivots):
             row = block.root[place[int(pivot)]]
             left = draws[:, pivot].copy()
-            for score, share in zip(own, row[:k], strict=True):
+            for score, share in zip(of_block, row[:k], strict=True):
                 left -= share * score
-            own.append(left / row[k])
-        found += own
-    return np.stack(found, axis=1)
+            of_block.append(left / row[k])
+        independent += of_block
+    return np.stack(independent, axis=1)

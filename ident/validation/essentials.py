@@ -46,7 +46,7 @@ def refuse_without_essentials(vehicle: Vehicle, rows: pd.DataFrame, metadata: Ma
 
 def _absent(conversions: Mapping[str, object]) -> set[str]:
     """Loads that the campaigns of a version declare absent."""
-    found = set(conversions.get("absent") or ())  # type: ignore[call-overload]
+    absent = set(conversions.get("absent") or ())  # type: ignore[call-overload]
     for one in (conversions.get("campaigns") or {}).values():  # type: ignore[attr-defined]
-        found |= _absent(one)
-    return found
+        absent |= _absent(one)
+    return absent

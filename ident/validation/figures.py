@@ -109,11 +109,11 @@ def _line(done: Validation, source: str) -> dict[str, Any]:
 
 def _flights(done: Validation) -> list[tuple[Simulation, dict[str, Any]]]:
     main = {"color": "tab:red", "lw": 1.6, "label": "simulated from the database"}
-    own = [
+    as_started = [
         (flight, {"color": "tab:orange", "lw": 1.2, "ls": "-.", "label": f"simulated as {in_figure(source)} starts"})
         for source, flight in done.as_started.items()
     ]
-    return [(done.simulation, main), *own]
+    return [(done.simulation, main), *as_started]
 
 
 def _series(done: Validation, channel: str, axis: Any, bands: Bands | None) -> None:

@@ -71,21 +71,21 @@ def loads_by_part(case: Case, boat: Boat, flight: Simulation, by: str = "part") 
         raise ValueError(f"by {by!r}: part or coefficient")
     record = np.ascontiguousarray(flight.record)
     states, controls = record[:, 1:13], record[:, 13 : 13 + len(boat.vehicle.planes) + 1]
-    found: dict[str, Array] = {}
+    by_source: dict[str, Array] = {}
     # Thrust needs thrust deduction and wake, which are rows of the propeller, whatever is asked.
     sections = {s.name for s in boat.vehicle.sections.centres} if boat.vehicle.sections else set()
     # Sections carry loads in a wave's acceleration alone.
     rows = boat.rows[~boat.rows["part"].isin(sections)]
     rows = rows.assign(source=rows[by].where(rows["part"] != "propeller", "propeller"))
-    for name, own in rows.groupby("source", sort=False):
-        found[str(name)] = _loads(case, boat, own.drop(columns="source"), states, controls)
-    found |= _inertia_and_weight(case, boat, flight, states)
-    total = np.sum(list(found.values()), axis=0)
+    for name, of_source in rows.groupby("source", sort=False):
+        by_source[str(name)] = _loads(case, boat, of_source.drop(columns="source"), states, controls)
+    by_source |= _inertia_and_weight(case, boat, flight, states)
+    total = np.sum(list(by_source.values()), axis=0)
     if flight.waves is not None:
-        found[WAVES] = -total
+        by_source[WAVES] = -total
     units = [f"{o}_{'N' if o in 'XYZ' else 'Nm'}" for o in OUTPUTS]
     tables = [
-        pd.DataFrame(values, columns=units).assign(t_s=record[:, 0], source=name) for name, values in found.items()
+        pd.DataFrame(values, columns=units).assign(t_s=record[:, 0], source=name) for name, values in by_source.items()
     ]
     return pd.concat(tables, ignore_index=True)[["t_s", "source", *units]]
 
@@ -144,8 +144,8 @@ def loads_figure(table: pd.DataFrame, path: Path, most: int = 8) -> Path:
     for ax, column in zip(axes, [c for c in table.columns if c not in ("t_s", "source")], strict=True):
         size = table.groupby("source", sort=False)[column].agg(lambda x: x.abs().max())
         for name in size[size > 0.0].sort_values(ascending=False).index[:most]:
-            own = table[table["source"] == name]
-            ax.plot(own["t_s"], own[column], lw=1.0, label=str(name))
+            of_source = table[table["source"] == name]
+            ax.plot(of_source["t_s"], of_source[column], lw=1.0, label=str(name))
         ax.set_ylabel(column.replace("_", " [") + "]")
         ax.legend(frameon=False, fontsize=6, ncols=2)
     for ax in axes[2::3]:

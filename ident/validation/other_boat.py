@@ -160,16 +160,16 @@ def for_boat(case: Case, where: str, vehicle: Vehicle, asked: Asked) -> tuple[Ca
     InputError
         For an angle where the case commands none.
     """
-    own, changed = vehicle.name == case.vehicle or _home(case, where) == vehicle.name, asked != Asked()
-    if own and not changed:
+    at_home, changed = vehicle.name == case.vehicle or _home(case, where) == vehicle.name, asked != Asked()
+    if at_home and not changed:
         return case.model_copy(update={"vehicle": vehicle.name}), []
     notes: list[str] = []
     home = case.vehicle
     if case.reference or case.published or case.tolerance:
-        what = "of " + home if not own else "at the case's own speed, depth and angle"
+        what = "of " + home if not at_home else "at the case's own speed, depth and angle"
         notes.append(f"references, published values and tolerances {what} left out")
     moved = case.model_copy(update={"vehicle": vehicle.name, "reference": None, "published": [], "tolerance": []})
-    if not own and where in bundled("cases"):
+    if not at_home and where in bundled("cases"):
         ratio = vehicle.particulars.length.value / load_vehicle(home).particulars.length.value
         moved = _scaled(moved, ratio)
         if case.initial.speed_mps and asked.speed_mps is None:
@@ -194,13 +194,13 @@ def _home(case: Case, where: str) -> str:
 
 def _commanded(case: Case) -> list[str]:
     """Axes to which the case gives an angle, by itself or by a programme."""
-    found = []
+    commanded = []
     for axis in ("dV", "dH"):
         one = getattr(case.command, axis)
         fixed = one.law == "fixed" and bool(one.value_deg)
         if fixed or one.law == "zigzag" or any(s.value_deg or s.yaw_rate_degps for s in one.step):
-            found.append(axis)
-    return found
+            commanded.append(axis)
+    return commanded
 
 
 @dataclass(frozen=True)
@@ -245,10 +245,10 @@ def check_answers(simulation: Simulation, case: Case, vehicle: Vehicle) -> None:
     for axis in _commanded(case):
         angle, track = ("psi", "y") if axis == "dH" else ("theta", "z")
         if largest_command(case, vehicle, axis) is None:
-            found = f"{axis} is commanded, and no plane of {vehicle.name} has a share in it"
+            wrong = f"{axis} is commanded, and no plane of {vehicle.name} has a share in it"
         elif np.ptp(simulation[angle]) < _STOPS and np.ptp(simulation[track]) < 1e-6 * simulation.length:
-            found = f"a flat line: {axis} is commanded, and {angle} of {vehicle.name} does not change"
+            wrong = f"a flat line: {axis} is commanded, and {angle} of {vehicle.name} does not change"
         else:
             continue
         allowed = "a version with the loads of its planes or rudder: terms in the term set and rows in the database"
-        raise InputError(f"case {case.name}", found, allowed)
+        raise InputError(f"case {case.name}", wrong, allowed)

@@ -85,24 +85,26 @@ def compared(along: Array, simulation: Simulation, abscissa: str, what: str) -> 
     text = f"two points or more within the run, which ends at {abscissa} = {end:.4g} {unit}"
     if not flown.any():
         raise InputError(what, f"begins at {abscissa} = {along[0]:.4g}", text)
-    found = (
+    wrong = (
         "one point" if len(along) == 1 else f"one of {len(along)} points; the next is at {abscissa} = {along[1]:.4g}"
     )
-    raise InputError(what, found, text)
+    raise InputError(what, wrong, text)
 
 
-def beyond_the_run(case: Case, reference: Series, simulation: Simulation, own: dict[str, Simulation]) -> list[str]:
+def beyond_the_run(
+    case: Case, reference: Series, simulation: Simulation, as_started: dict[str, Simulation]
+) -> list[str]:
     """Notes on points that lie beyond a flight, and on series that cover little of it.
 
     Parameters
     ----------
     case, reference : What was flown, and what it is held against.
-    simulation, own : From ``ident.validation.validate.flights``.
+    simulation, as_started : From ``ident.validation.validate.flights``.
     """
     said = []
     name = reference.abscissa
     for source in case.reference.compare if case.reference else []:
-        flight = own.get(source, simulation)
+        flight = as_started.get(source, simulation)
         end = float(flight[name][-1])
         kept = {c: r.abscissa for c, r in reference[source].items() if case.reference and c in case.reference.channels}
         beyond = {c: int(np.sum(along > end + 1e-9)) for c, along in kept.items()}

@@ -182,7 +182,7 @@ def _depth(trial: Trial) -> str:
 
 def samples(trial: Trial, duration: float) -> dict[str, Record]:
     """The samples of a trial from the execute on, as long as the case is flown, by channel of a simulation."""
-    found: dict[str, Record] = {}
+    records: dict[str, Record] = {}
     base, start = _base(trial), trial.start.time
     for name, record in trial.recording.channels.items():
         channel = _depth(trial) if name == "z" else name
@@ -193,15 +193,15 @@ def samples(trial: Trial, duration: float) -> dict[str, Record]:
             continue
         offset = base if name == "psi" else 0.0
         sigma = trial.paths[name].sigma if name in trial.paths else None
-        found[channel] = _record(channel, after.abscissa - start, after.value - offset, sigma)
+        records[channel] = _record(channel, after.abscissa - start, after.value - offset, sigma)
     if {"north", "east"} <= set(trial.paths):
         north = trial.recording.channels["north"]
         inside = (north.abscissa >= start - 1e-9) & (north.abscissa <= start + duration + 1e-9)
         t = north.abscissa[inside]
         x, y = _turned(trial, base, north.value[inside], trial.recording.channels["east"].at(t))
         sigma = trial.paths["north"].sigma
-        found |= {"x": _record("x", t - start, x, sigma), "y": _record("y", t - start, y, sigma)}
-    return found
+        records |= {"x": _record("x", t - start, x, sigma), "y": _record("y", t - start, y, sigma)}
+    return records
 
 
 def _turned(trial: Trial, base: float, north: Array, east: Array) -> tuple[Array, Array]:
@@ -215,35 +215,35 @@ def paths(trial: Trial) -> dict[str, Record]:
     end = min(float(p.knots[-5]) for p in trial.paths.values())
     at = np.linspace(trial.start.time, end, _GRID)
     t, base = at - trial.start.time, _base(trial)
-    found: dict[str, Record] = {}
+    records: dict[str, Record] = {}
     for name, path in trial.paths.items():
         channel = _depth(trial) if name == "z" else name
         if channel in CHANNELS and name not in ("x", "y"):
-            found[channel] = _record(channel, t, path(at) - (base if name == "psi" else 0.0), None)
+            records[channel] = _record(channel, t, path(at) - (base if name == "psi" else 0.0), None)
     for angle, rate in (("psi", "r"), ("theta", "q"), ("phi", "p")):
         if angle in trial.paths:
-            found[rate] = _record(rate, t, trial.paths[angle](at, 1), None)
+            records[rate] = _record(rate, t, trial.paths[angle](at, 1), None)
     if {"north", "east"} <= set(trial.paths):
         x, y = _turned(trial, base, trial.paths["north"](at), trial.paths["east"](at))
-        found = {"x": _record("x", t, x, None), "y": _record("y", t, y, None)} | found
-    return found
+        records = {"x": _record("x", t, x, None), "y": _record("y", t, y, None)} | records
+    return records
 
 
 def _start(trial: Trial, case: Case) -> dict[str, Any]:
     """The state measured at the execute, as far as a case can start from it."""
-    found: dict[str, Any] = {}
+    start: dict[str, Any] = {}
     speed = trial.metrics.get("approach_speed_mps")
     if speed is not None and speed.value > 0.0 and case.initial.speed_mps > 0.0:
-        found["speed_mps"] = speed.value
+        start["speed_mps"] = speed.value
     if case.initial.state == "as_given":
         for name, key in (("phi", "heel_deg"), ("theta", "pitch_deg")):
             if name in trial.paths:
-                found[key] = math.degrees(float(trial.paths[name](trial.start.time)))
+                start[key] = math.degrees(float(trial.paths[name](trial.start.time)))
         if "n" in trial.recording.channels:
-            found["revolutions_rps"] = float(trial.recording.channels["n"].at(trial.start.time))
+            start["revolutions_rps"] = float(trial.recording.channels["n"].at(trial.start.time))
     if "z" in trial.paths and _depth(trial) == "D0":
-        found["depth_m"] = float(trial.paths["z"](trial.start.time))
-    return found
+        start["depth_m"] = float(trial.paths["z"](trial.start.time))
+    return start
 
 
 def _commands_differ(case: Case, trial: Trial) -> list[str]:
@@ -264,13 +264,13 @@ def _commands_differ(case: Case, trial: Trial) -> list[str]:
 
 def _steps(t: Array, value: Array, alike: float) -> list[tuple[float, float]]:
     """Duration and value of stretches over which a recorded control is one value."""
-    found: list[tuple[float, float]] = []
+    steps: list[tuple[float, float]] = []
     start = 0
     for i in range(1, len(t)):
         if abs(value[i] - value[start]) > alike:
-            found.append((float(t[i] - t[start]), float(value[start])))
+            steps.append((float(t[i] - t[start]), float(value[start])))
             start = i
-    return [*found, (float("inf"), float(value[start]))]
+    return [*steps, (float("inf"), float(value[start]))]
 
 
 def _held(t: Array, value: Array) -> tuple[Array, Array]:
@@ -322,9 +322,9 @@ def smoothed(series: Series) -> Series:
     if series.abscissa != "t":
         return series
     for source, channels in series.data.items():
-        found = {name: path for name, record in channels.items() if (path := _if_noisy(record)) is not None}
-        if found:
-            series.smooth[source] = channels | found
+        smooth = {name: path for name, record in channels.items() if (path := _if_noisy(record)) is not None}
+        if smooth:
+            series.smooth[source] = channels | smooth
     return series
 
 

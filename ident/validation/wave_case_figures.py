@@ -23,8 +23,8 @@ def figures_of(done: Validation, folder: Path, kind: str = "png") -> list[Path]:
     folder : Where to write.
     kind : Suffix of the files.
     """
-    own = folder / f"{in_file_name(done.case.name)}_v{done.version}.{kind}"
-    return [case_figure(done, own, done.bands), *sea_figures(done, folder, kind)]
+    path = folder / f"{in_file_name(done.case.name)}_v{done.version}.{kind}"
+    return [case_figure(done, path, done.bands), *sea_figures(done, folder, kind)]
 
 
 def sea_figures(done: Validation, folder: Path, kind: str = "png") -> list[Path]:
@@ -41,12 +41,12 @@ def sea_figures(done: Validation, folder: Path, kind: str = "png") -> list[Path]
     database = done.database
     stamp = version_words(database)
     title, name = f"{done.case.title}, {done.case.vehicle}", f"{in_file_name(done.case.name)}_v{database['version']}"
-    found = done.in_waves.statistics
-    met = seaway.encountered(done.simulation.waves, done.simulation, start=found["D0"].start)
+    statistics = done.in_waves.statistics
+    met = seaway.encountered(done.simulation.waves, done.simulation, start=statistics["D0"].start)
     return [
-        seaway_figure(done.simulation, found, folder / f"{name}_histories.{kind}", title, stamp, BROACHING),
-        spectrum_figure(found, met, folder / f"{name}_spectra.{kind}", title, stamp),
-        exceedance_figure(found["D0"], folder / f"{name}_broaching.{kind}", title, stamp, "below", BROACHING),
+        seaway_figure(done.simulation, statistics, folder / f"{name}_histories.{kind}", title, stamp, BROACHING),
+        spectrum_figure(statistics, met, folder / f"{name}_spectra.{kind}", title, stamp),
+        exceedance_figure(statistics["D0"], folder / f"{name}_broaching.{kind}", title, stamp, "below", BROACHING),
     ]
 
 

@@ -41,7 +41,7 @@ _LABEL_OF = {
 
 def seaway_figure(
     simulation: Simulation,
-    found: Mapping[str, Statistics],
+    statistics: Mapping[str, Statistics],
     path: Path,
     title: str,
     stamp: str,
@@ -52,7 +52,7 @@ def seaway_figure(
     Parameters
     ----------
     simulation : The flight.
-    found : Channel -> statistics, from ``seaway.statistics``.
+    statistics : Channel -> statistics, from ``seaway.statistics``.
     path : File to write; the suffix chooses the format.
     title : Case and vehicle. stamp : Database version.
     level : Depth of the sail top that counts as broaching, drawn on D0 when within 8 sigma [m].
@@ -61,10 +61,10 @@ def seaway_figure(
     -------
     ``path``.
     """
-    figure = blank(11, 2.1 * len(found) + 1.4)
-    margins(figure, len(found), 1, top=0.85, gap=0.3)
-    axes = figure.subplots(len(found), 1, sharex=True, squeeze=False)
-    for (channel, one), axis in zip(found.items(), axes[:, 0], strict=True):
+    figure = blank(11, 2.1 * len(statistics) + 1.4)
+    margins(figure, len(statistics), 1, top=0.85, gap=0.3)
+    axes = figure.subplots(len(statistics), 1, sharex=True, squeeze=False)
+    for (channel, one), axis in zip(statistics.items(), axes[:, 0], strict=True):
         values, name, unit = readable(channel, simulation[channel])
         trend, sigma = readable(channel, one.trend)[0], readable(channel, np.array(one.sigma))[0]
         axis.plot(simulation["t"], values, color="tab:red", lw=0.7, label="simulated from the database")
@@ -100,13 +100,13 @@ def _drawn_to(frequency: Array, density: Array) -> float:
 
 
 def spectrum_figure(
-    found: Mapping[str, Statistics], elevation: tuple[Array, Array], path: Path, title: str, stamp: str
+    statistics: Mapping[str, Statistics], elevation: tuple[Array, Array], path: Path, title: str, stamp: str
 ) -> Path:
     """Spectra of the motions under that of the waves as the boat meets them.
 
     Parameters
     ----------
-    found : Channel -> statistics.
+    statistics : Channel -> statistics.
     elevation : Time [s] and elevation over the origin [m], from ``seaway.encountered``.
     path, title, stamp : As in ``seaway_figure``.
 
@@ -115,40 +115,43 @@ def spectrum_figure(
     ``path``.
     """
     time, eta = elevation
-    first = next(iter(found.values()))
+    first = next(iter(statistics.values()))
     waves = spectrum(eta, uniform_step(time), first.spectrum.resolution)
     panels = [("waves over the origin", "m", waves, 1.0, "tab:blue", 0.0)]
-    for channel, one in found.items():
+    for channel, one in statistics.items():
         one_unit, name, unit = readable(channel, np.ones(1))
         panels.append((name, unit, one.spectrum, float(one_unit[0]) ** 2, "tab:red", one.rice_period))
     figure = blank(9, 1.9 * len(panels) + 1.2)
     margins(figure, len(panels), 1, top=0.85, gap=0.4)
     axes = figure.subplots(len(panels), 1, sharex=True)
-    for (name, unit, own, scale, colour, period), axis in zip(panels, axes, strict=True):
-        axis.plot(own.frequency, scale * own.density, color=colour, lw=1.3)
-        axis.fill_between(own.frequency, scale * own.density, color=colour, alpha=0.15, lw=0)
-        m0 = scale * float(own.moments((0,))[0])
+    for (name, unit, drawn, scale, colour, period), axis in zip(panels, axes, strict=True):
+        axis.plot(drawn.frequency, scale * drawn.density, color=colour, lw=1.3)
+        axis.fill_between(drawn.frequency, scale * drawn.density, color=colour, alpha=0.15, lw=0)
+        m0 = scale * float(drawn.moments((0,))[0])
         words = f"{name}: $4\\sqrt{{m_0}}$ = {4.0 * m0**0.5:.3g} {unit}"
         words += f", $2\\pi\\sqrt{{m_0/m_2}}$ = {period:.3g} s" if period else ""
         axis.set_title(
-            f"{words}; resolution {own.resolution:.2g} rad/s, {own.segments} segments", loc="left", fontsize=9, y=1.0
+            f"{words}; resolution {drawn.resolution:.2g} rad/s, {drawn.segments} segments",
+            loc="left",
+            fontsize=9,
+            y=1.0,
         )
         dress(axis, "", rf"S [{unit}$^2$ s/rad]")
         axis.set_ylim(bottom=0.0)
-    highest = max(_drawn_to(own.frequency, own.density) for _, _, own, *_ in panels)
+    highest = max(_drawn_to(drawn.frequency, drawn.density) for _, _, drawn, *_ in panels)
     axes[-1].set_xlim(0.0, 1.05 * highest)
     axes[-1].set_xlabel(r"frequency of encounter $\omega_e$ [rad/s]")
     return finish(figure, path, title, stamp)
 
 
 def exceedance_figure(
-    found: Statistics, path: Path, title: str, stamp: str, side: Side = "below", level: float | None = None
+    of: Statistics, path: Path, title: str, stamp: str, side: Side = "below", level: float | None = None
 ) -> Path:
     """Crossings of levels a hour, counted and by Rice, on a logarithmic axis.
 
     Parameters
     ----------
-    found : Statistics of the channel.
+    of : Statistics of the channel.
     path, title, stamp : As in ``seaway_figure``.
     side : Side of the level that is out; ``below`` for a depth.
     level : A level to mark: broaching.
@@ -158,13 +161,13 @@ def exceedance_figure(
     ``path``.
     """
     sense = -1.0 if side == "below" else 1.0
-    largest = float((sense * (found.trend + found.deviation - found.mean)).max())
-    reach = max(_BEYOND * found.sigma, 1.05 * largest)
-    if level is not None and rice_rate(found, level) > _LEAST:
-        reach = max(reach, 1.05 * sense * (level - found.mean))
-    levels = found.mean + sense * np.linspace(0.0, reach, _LEVELS)
-    each = exceedances(found, list(levels), side)
-    shown, name, unit = readable(found.channel, levels)
+    largest = float((sense * (of.trend + of.deviation - of.mean)).max())
+    reach = max(_BEYOND * of.sigma, 1.05 * largest)
+    if level is not None and rice_rate(of, level) > _LEAST:
+        reach = max(reach, 1.05 * sense * (level - of.mean))
+    levels = of.mean + sense * np.linspace(0.0, reach, _LEVELS)
+    each = exceedances(of, list(levels), side)
+    shown, name, unit = readable(of.channel, levels)
     rate, error = np.array([e.predicted for e in each]), np.array([e.predicted_stderr for e in each])
     figure = blank(8, 5.4)
     margins(figure, 1, 1)
@@ -188,16 +191,16 @@ def exceedance_figure(
         axis.errorbar(
             *counted[:, :2].T, yerr=bars, color="tab:red", fmt="o", ms=3, lw=0.8, label="counted ± Poisson error"
         )
-    hours = (found.end - found.start) / 3600.0
+    hours = (of.end - of.start) / 3600.0
     axis.axhline(1.0 / hours, color="k", ls=":", lw=0.9, label=f"once in the record of {hours:.3g} h")
     if level is not None:
-        mark = float(readable(found.channel, np.array(level))[0])
-        text = f"{mark:g} {unit}: Rice {rice_rate(found, level):.2g} a hour"
+        mark = float(readable(of.channel, np.array(level))[0])
+        text = f"{mark:g} {unit}: Rice {rice_rate(of, level):.2g} a hour"
         # A level that is never reached is named only: it would squeeze all that is reached.
-        place = mark if rice_rate(found, level) > _LEAST else np.nan
+        place = mark if rice_rate(of, level) > _LEAST else np.nan
         axis.axvline(place, color="tab:green", ls="--", lw=1.0, label=text)
-    known = level is not None and rice_rate(found, level) > _LEAST
-    bottom = min(0.1 / hours, 0.3 * rice_rate(found, float(level or 0.0))) if known else 0.1 / hours
+    known = level is not None and rice_rate(of, level) > _LEAST
+    bottom = min(0.1 / hours, 0.3 * rice_rate(of, float(level or 0.0))) if known else 0.1 / hours
     axis.set_ylim(max(bottom, _LEAST), 2.0 * rate.max())
     dress(axis, f"level of {name} [{unit}]", f"crossings to {side} the level [1/h]")
     axis.legend(fontsize=8, frameon=False)
@@ -225,9 +228,9 @@ def harmonics_figure(
     axes = figure.subplots(1, 2)
     depths = sorted(flown)
     for channel, axis in zip(_LABEL_OF, axes, strict=True):
-        own = [(d, *as_published(flown[d])[channel]) for d in depths if channel in as_published(flown[d])]
-        if own:
-            d, value, error = np.array(own).T
+        simulated = [(d, *as_published(flown[d])[channel]) for d in depths if channel in as_published(flown[d])]
+        if simulated:
+            d, value, error = np.array(simulated).T
             label = "simulated from the database, ± 2 s.e."
             axis.errorbar(d, value, yerr=2.0 * error, marker="D", ms=5, capsize=3, label=label, **_OWN)
         for source, rows in reference[reference["channel"] == channel].groupby("source"):

@@ -22,26 +22,26 @@ def main(tries: int, to: str | None, guard: bool, keep: bool) -> None:
     from sim.bench.guard import fallen, record, recorded
     from sim.bench.measure import jsbsim_us, ratios
 
-    found: dict[str, Any] = ratios(tries, lambda text: click.echo(f"measuring {text}", err=True))
-    found |= jsbsim_us()
-    lines = fallen(found) if guard else []
+    measured: dict[str, Any] = ratios(tries, lambda text: click.echo(f"measuring {text}", err=True))
+    measured |= jsbsim_us()
+    lines = fallen(measured) if guard else []
     if lines:
         # Other work on the machine may have met one of two times only: what fell, fell twice.
         click.echo("measuring once more", err=True)
-        found |= ratios(2 * tries)
-        lines = fallen(found)
-    text = json.dumps(found, indent=1)
+        measured |= ratios(2 * tries)
+        lines = fallen(measured)
+    text = json.dumps(measured, indent=1)
     if to == "-":
         click.echo(text)
     else:
         for line in recorded():
-            if line.name in found:
-                click.echo(f"{line.label:46s} {found[line.name]:12.4g} {line.unit}".rstrip())
+            if line.name in measured:
+                click.echo(f"{line.label:46s} {measured[line.name]:12.4g} {line.unit}".rstrip())
         if to:
             with open(to, "w", encoding="utf-8") as stream:
                 stream.write(text + "\n")
     if keep:
-        record(found)
+        record(measured)
     for fell in lines:
         click.echo(fell, err=True)
     if lines:

@@ -30,25 +30,25 @@ def recorded() -> list[Line]:
         return [Line(r["name"], r["label"], r["unit"], r["better"], float(r["value"])) for r in csv.DictReader(stream)]
 
 
-def record(found: dict[str, float]) -> None:
+def record(measured: dict[str, float]) -> None:
     """Write the numbers of a run into ``recorded.csv`` of this checkout; others stay."""
-    lines = [line._replace(value=found.get(line.name, line.value)) for line in recorded()]
+    lines = [line._replace(value=measured.get(line.name, line.value)) for line in recorded()]
     with _FILE.open("w", encoding="utf-8", newline="") as stream:
         writer = csv.writer(stream, lineterminator="\n")
         writer.writerow(Line._fields)
         writer.writerows((*line[:4], f"{line.value:.3g}") for line in lines)
 
 
-def fallen(found: dict[str, float]) -> list[str]:
+def fallen(measured: dict[str, float]) -> list[str]:
     """What is worse than recorded by more than a quarter, one line each."""
     lines = []
     for line in recorded():
         if not line.better:
             continue
-        now = found[line.name]
-        if line.name == "batch_efficiency" and "free_cores" in found:
+        now = measured[line.name]
+        if line.name == "batch_efficiency" and "free_cores" in measured:
             # Other work on the machine takes its share of the cores.
-            now *= found["cores"] / found["free_cores"]
+            now *= measured["cores"] / measured["free_cores"]
         gain = now / line.value if line.better == "more" else line.value / now
         if not gain >= 1.0 - SLACK:
             lines.append(f"{line.name}: {now:.3g}, recorded {line.value:.3g}; {line.better} is better")

@@ -100,13 +100,15 @@ def ratios(tries: int = 300, say: Callable[[str], None] = lambda text: None) -> 
         "components": _voyage(model, states, controls, h, waters[1]),
     }
     say("right-hand sides and steps")
-    found = {k: v / len(states) for k, v in shortest(calls, tries).items()}
+    seconds = {k: v / len(states) for k, v in shortest(calls, tries).items()}
     say("the same in NumPy")
     numpy_calls = {"numpy": lambda: [plain.rhs(model, states[i], controls[i]) for i in few]}
-    found["numpy"] = shortest(numpy_calls, tries)["numpy"] / len(few)
+    seconds["numpy"] = shortest(numpy_calls, tries)["numpy"] / len(few)
     say("a plant")
     plant = Plant(case, coefficients)
-    found["plant"] = shortest({"plant": lambda: [plant.step(dH=0.01) for _ in range(_PLANT)]}, tries)["plant"] / _PLANT
+    seconds["plant"] = (
+        shortest({"plant": lambda: [plant.step(dH=0.01) for _ in range(_PLANT)]}, tries)["plant"] / _PLANT
+    )
     say(f"{FLIGHTS} flights")
     flight_steps, vehicle = samples_of(case)[0], coefficients.vehicle
     one_flight = shortest({"flight": lambda: fly(case, vehicle, model, None)}, max(tries // 10, 3))["flight"]
@@ -114,20 +116,20 @@ def ratios(tries: int = 300, say: Callable[[str], None] = lambda text: None) -> 
     elapsed, busy = _busy(lambda k: fly(case, vehicle, model, None), FLIGHTS)
     batch, alone = FLIGHTS * flight_steps / elapsed, flight_steps / one_flight
     return {
-        "rhs_us": 1e6 * found["rhs"],
-        "rk4_steps_per_s": 1.0 / found["calm"],
-        "numpy_us": 1e6 * found["numpy"],
-        "numpy_ratio": found["numpy"] / found["rhs"],
-        "waves_ratio": found["regular"] / found["calm"],
-        "components_ratio": found["components"] / found["calm"],
+        "rhs_us": 1e6 * seconds["rhs"],
+        "rk4_steps_per_s": 1.0 / seconds["calm"],
+        "numpy_us": 1e6 * seconds["numpy"],
+        "numpy_ratio": seconds["numpy"] / seconds["rhs"],
+        "waves_ratio": seconds["regular"] / seconds["calm"],
+        "components_ratio": seconds["components"] / seconds["calm"],
         "flight_steps_per_s": alone,
-        "flight_ratio": one_flight / flight_steps / found["calm"],
+        "flight_ratio": one_flight / flight_steps / seconds["calm"],
         "batch_steps_per_s": batch,
         "batch_efficiency": batch / alone / (os.cpu_count() or 1),
         "busy_cores": busy,
         "free_cores": free,
-        "plant_step_us": 1e6 * found["plant"],
-        "plant_ratio": found["plant"] / found["calm"],
+        "plant_step_us": 1e6 * seconds["plant"],
+        "plant_ratio": seconds["plant"] / seconds["calm"],
         "cores": os.cpu_count() or 1,
     }
 
@@ -147,15 +149,15 @@ def jsbsim_us(tries: int = 30) -> dict[str, float]:
         import jsbsim
     except ImportError:
         return {}
-    found = {}
+    times = {}
     for name, speed in (("c172x", 200.0), ("f16", 500.0)):
         plane = jsbsim.FGFDMExec(None)
         plane.set_debug_level(0)
         plane.load_model(name)
         plane["ic/h-sl-ft"], plane["ic/u-fps"] = 5000.0, speed
         plane.run_ic()
-        found[f"jsbsim_{name}_us"] = 1e4 * shortest({"run": partial(_run_often, plane)}, tries)["run"]
-    return found
+        times[f"jsbsim_{name}_us"] = 1e4 * shortest({"run": partial(_run_often, plane)}, tries)["run"]
+    return times
 
 
 def _run_often(plane: Any) -> None:

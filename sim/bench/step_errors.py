@@ -85,12 +85,12 @@ def _every() -> Iterator[StepError]:
         if case.vehicle != coefficients.vehicle.name:
             continue
         try:
-            found = step_error(case, coefficients)
-        except NoEquilibrium as error:
-            click.echo(f"{name}: {error}", err=True)
+            error = step_error(case, coefficients)
+        except NoEquilibrium as reason:
+            click.echo(f"{name}: {reason}", err=True)
             continue
-        click.echo(f"{name}: u {found.u_mps:.2g} m/s, D0 {found.D0_m:.2g} m, psi {found.psi_deg:.2g} deg", err=True)
-        yield found
+        click.echo(f"{name}: u {error.u_mps:.2g} m/s, D0 {error.D0_m:.2g} m, psi {error.psi_deg:.2g} deg", err=True)
+        yield error
 
 
 @click.command()

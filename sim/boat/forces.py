@@ -63,21 +63,21 @@ def boat_features(
     p, q, r = rates
     speed = math.sqrt(u * u + v * v + w * w)
     base = {"u": u, "v": v, "w": w, "p": p, "q": q, "r": r}
-    found = dict(base) | {f"|{k}|": abs(x) for k, x in base.items()}
-    found |= {a + b: base[a] * base[b] for a in "uvw" for b in "pqr"}
-    found |= {"pq": p * q, "qr": q * r, "rp": r * p}
-    found["U"] = speed
-    found["v/U"], found["r/U"] = (v / speed, r / speed) if speed else (0.0, 0.0)
-    found["v/r"] = v / r if abs(r) > STILL else 0.0
-    found["w/q"] = w / q if abs(q) > STILL else 0.0
-    found["S"] = math.hypot(v, w)
-    found["sgn(v)"], found["sgn(w)"] = float(np.sign(v)), float(np.sign(w))
-    found["alpha"] = math.atan2(w, u) if u or w else 0.0
-    found["beta"] = math.asin(max(-1.0, min(1.0, v / speed))) if speed else 0.0
-    found["D0"] = depth
-    found["n"], found["|n|"], found["J"] = revolutions, abs(revolutions), advance
-    found["slip"], found["uslip"] = slip, slip * u
-    return found
+    features = dict(base) | {f"|{k}|": abs(x) for k, x in base.items()}
+    features |= {a + b: base[a] * base[b] for a in "uvw" for b in "pqr"}
+    features |= {"pq": p * q, "qr": q * r, "rp": r * p}
+    features["U"] = speed
+    features["v/U"], features["r/U"] = (v / speed, r / speed) if speed else (0.0, 0.0)
+    features["v/r"] = v / r if abs(r) > STILL else 0.0
+    features["w/q"] = w / q if abs(q) > STILL else 0.0
+    features["S"] = math.hypot(v, w)
+    features["sgn(v)"], features["sgn(w)"] = float(np.sign(v)), float(np.sign(w))
+    features["alpha"] = math.atan2(w, u) if u or w else 0.0
+    features["beta"] = math.asin(max(-1.0, min(1.0, v / speed))) if speed else 0.0
+    features["D0"] = depth
+    features["n"], features["|n|"], features["J"] = revolutions, abs(revolutions), advance
+    features["slip"], features["uslip"] = slip, slip * u
+    return features
 
 
 def slipstream(ahead: float, revolutions: float, pitch: float, loading: float) -> float:

@@ -52,7 +52,7 @@ def unit_added_masses(coefficients: Coefficients, environment: Environment) -> l
     """
     vehicle = coefficients.vehicle
     length, diameter = vehicle.particulars.length.value, vehicle.diameter
-    found = []
+    masses = []
     centres = {s.name: s.position for s in vehicle.sections.centres} if vehicle.sections else {}
     for coefficient in coefficients:
         term = coefficient.term
@@ -65,8 +65,8 @@ def unit_added_masses(coefficients: Coefficients, environment: Environment) -> l
             unit = -load * np.outer(motion[i], motion[j])
         else:
             unit[i, j] = -load
-        found.append((coefficient, unit))
-    return found
+        masses.append((coefficient, unit))
+    return masses
 
 
 def added_mass_matrix(coefficients: Coefficients, environment: Environment) -> Array:

@@ -159,7 +159,7 @@ def _line_interpolation(index: tuple[int, ...], axes: Sequence[Array], measured:
 
 def _without_interaction(index: tuple[int, ...], known: NDArray[np.bool_]):
     """(node, weight) triple C(a,b0) + C(a0,b) - C(a0,b0) from the nearest known nodes."""
-    best, found = None, None
+    best, corners = None, None
     for j, k in itertools.combinations(range(len(index)), 2):
         plane = known[tuple(slice(None) if m in (j, k) else i for m, i in enumerate(index))]
         # At (a, b): itself and the two corners it shares with the missing node are known.
@@ -172,8 +172,8 @@ def _without_interaction(index: tuple[int, ...], known: NDArray[np.bool_]):
             keep_j, keep_k, neither = list(index), list(index), list(index)
             keep_j[k], keep_k[j], neither[j], neither[k] = b, a, a, b
             triple = [tuple(keep_j), tuple(keep_k), tuple(neither)]
-            best, found = int(distance[a, b]), list(zip(triple, (1.0, 1.0, -1.0), strict=True))
-    return found
+            best, corners = int(distance[a, b]), list(zip(triple, (1.0, 1.0, -1.0), strict=True))
+    return corners
 
 
 @lru_cache(maxsize=256)

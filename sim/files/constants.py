@@ -21,8 +21,7 @@ class Constant(NamedTuple):
 @cache
 def constants() -> dict[str, Constant]:
     """Every constant by its name."""
-    with (files("sim") / "data" / "constants.csv").open(encoding="utf-8", newline="") as file:
-        rows = list(csv.DictReader(file))
+    rows = csv.DictReader((files("sim") / "data" / "constants.csv").read_text("utf-8").splitlines())
     return {r["name"]: Constant(r["name"], float(r["value"]), r["unit"], r["meaning"], r["source"]) for r in rows}
 
 

@@ -43,10 +43,10 @@ def _open_loop(case: Case) -> Case:
 
 def _given(name: str, values: ArrayLike | None, default: Array) -> Array:
     """A copy of values, of the default's shape."""
-    found = np.array(default if values is None else values, dtype=float)
-    if found.shape != default.shape or not np.isfinite(found).all():
-        raise InputError(f"plant, {name}", f"{np.shape(found)} {found.tolist()}", f"{default.size} finite numbers")
-    return found
+    given = np.array(default if values is None else values, dtype=float)
+    if given.shape != default.shape or not np.isfinite(given).all():
+        raise InputError(f"plant, {name}", f"{np.shape(given)} {given.tolist()}", f"{default.size} finite numbers")
+    return given
 
 
 class Plant:

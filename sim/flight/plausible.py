@@ -84,8 +84,8 @@ def check_steepness(case: Case, height: float, length: float) -> None:
     if not length > 1e-6:
         raise InputError(where, f"waves of {length:.3g} m length", "a length or a period of waves of water")
     if height > _STEEPEST * length:
-        found = f"{height:.4g} m high and {length:.4g} m long: steepness {height / length:.3g}"
-        raise InputError(where, found, f"a steepness of {_STEEPEST:g} at most, at which waves break")
+        wave = f"{height:.4g} m high and {length:.4g} m long: steepness {height / length:.3g}"
+        raise InputError(where, wave, f"a steepness of {_STEEPEST:g} at most, at which waves break")
 
 
 def check_lengths(case: Case, vehicle: Vehicle, waves: Waves) -> None:

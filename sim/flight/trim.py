@@ -171,16 +171,16 @@ def self_propulsion(
     limits = dict(zip(TANK_NAMES, tank_limit or (np.inf, np.inf), strict=True))
     limited: tuple[str, ...] = ()
     while True:
-        found, wrong = _solve(model, mixer, speed, depth, free, values, upright)
+        trim, wrong = _solve(model, mixer, speed, depth, free, values, upright)
         if wrong:
             raise NoEquilibrium(wrong)
-        amounts = dict(zip(TANK_NAMES, found.controls[mixer.shape[0] + 1 :], strict=model.has_tanks))
+        amounts = dict(zip(TANK_NAMES, trim.controls[mixer.shape[0] + 1 :], strict=model.has_tanks))
         over = [k for k in reversed(TANK_NAMES) if k in free and abs(amounts[k]) > limits[k]]
         if not over:
             break
         values[over[0]] = float(np.sign(amounts[over[0]])) * limits[over[0]]
         free = tuple(_NEXT[k] if k == over[0] else k for k in free)
         limited += (over[0],)
-    if np.any(np.abs(found.controls[: mixer.shape[0]]) > plane_limit):
+    if np.any(np.abs(trim.controls[: mixer.shape[0]]) > plane_limit):
         raise NoEquilibrium(f"self-propulsion at {speed:.4g} m/s and D0 = {depth:.4g} m needs a plane beyond its limit")
-    return replace(found, limited=limited)
+    return replace(trim, limited=limited)

@@ -116,11 +116,11 @@ def tabulate(body: DipoleBody, waves: Waves, least: float, top_speed: float = 0.
     frequencies, height = _frequencies(waves), -float(body.points[:, 2].min())
     direct, answered = [], []
     for w in frequencies:
-        found = mean_loads(body, w, headings, speeds, least / _SHARES[1:])
+        means = mean_loads(body, w, headings, speeds, least / _SHARES[1:])
         # Per orbital velocity squared at the highest point and wave number they hardly depend on frequency.
         size = w**4 / body.gravity * np.exp(2.0 * w**2 / body.gravity * height)
-        direct.append(found.direct / size)
-        answered.append(found.answered / size)
+        direct.append(means.direct / size)
+        answered.append(means.answered / size)
     # Harmonics over the heading: a turn of the waves is a factor, and the sum over them exact.
     harmonic = np.arange(_DIRECTIONS // 2)
     turned = np.exp(1j * np.outer(np.arctan2(waves.east, waves.north), harmonic))[:, None, :, None]
@@ -202,5 +202,5 @@ def add_mean(drift: Drift, y: Array, out: Array) -> None:
     """
     if drift.loads.shape[0]:
         speeds, headings, depths = drift.loads.shape[:3]
-        found = _mean(drift.loads.ravel(), speeds, headings, depths, drift.decay, drift.least, drift.speed_step, y)
-        out[:6] += found
+        mean = _mean(drift.loads.ravel(), speeds, headings, depths, drift.decay, drift.least, drift.speed_step, y)
+        out[:6] += mean
