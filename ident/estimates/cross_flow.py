@@ -40,8 +40,8 @@ _LEAST, _MOST = constant("cylinder_drag_least"), constant("cylinder_drag_most")
 @cache
 def _finite_cylinders() -> tuple[Array, Array]:
     """Length over diameter, and drag on that of a long cylinder, which Allen and Perkins use as eta."""
-    with (files("ident") / "data" / "finite_cylinders.csv").open(encoding="utf-8", newline="") as file:
-        rows = [(float(r["length_to_diameter"]), float(r["drag_on_that_of_a_long_one"])) for r in csv.DictReader(file)]
+    table = csv.DictReader((files("ident") / "data" / "finite_cylinders.csv").read_text("utf-8").splitlines())
+    rows = [(float(row["length_to_diameter"]), float(row["drag_on_that_of_a_long_one"])) for row in table]
     slender, drag = np.array(rows).T
     return slender, drag
 

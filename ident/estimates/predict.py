@@ -67,10 +67,8 @@ _WORK: dict[str, Callable[[Draft, Given], str]] = {
 @cache
 def methods() -> tuple[Method, ...]:
     """Every estimate, in the order in which they work."""
-    with (files("ident") / "data" / "estimates.csv").open(encoding="utf-8", newline="") as file:
-        return tuple(
-            Method(row["name"], row["title"], row["source"], _WORK[row["name"]]) for row in csv.DictReader(file)
-        )
+    rows = csv.DictReader((files("ident") / "data" / "estimates.csv").read_text("utf-8").splitlines())
+    return tuple(Method(row["name"], row["title"], row["source"], _WORK[row["name"]]) for row in rows)
 
 
 @dataclass(frozen=True)

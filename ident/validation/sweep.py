@@ -57,12 +57,10 @@ def _solved(case: Case, vehicle: Vehicle, model: Model, speed: float, depth: flo
     except NoEquilibrium as error:
         return SweepPoint(speed, depth, reason=str(error))
     assert trim is not None
-    tanks = controls[len(vehicle.planes) + 1 :]
-    angles = np.degrees([trim.state[10], trim.state[9], trim.dV, trim.dH])
-    values = [controls[len(vehicle.planes)], *angles, *(tanks if len(tanks) else (0.0, 0.0))]
-    names = ("n_rps", "pitch_deg", "heel_deg", "dV_deg", "dH_deg", "ballast_kg", "trim_tank_m")
-    solved = {name: float(value) for name, value in zip(names, values, strict=True)}
-    return replace(SweepPoint(speed, depth, limited=list(trim.limited)), **solved)
+    revolutions, *tanks = (float(value) for value in controls[len(vehicle.planes) :])
+    ballast, trim_tank = tanks or (0.0, 0.0)
+    pitch, heel, dv, dh = (float(value) for value in np.degrees([trim.state[10], trim.state[9], trim.dV, trim.dH]))
+    return SweepPoint(speed, depth, revolutions, pitch, heel, dv, dh, ballast, trim_tank, list(trim.limited))
 
 
 def _named(point: SweepPoint) -> str:
