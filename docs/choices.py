@@ -9,12 +9,12 @@ from reference_tables import table
 
 from ident.captive.campaign import Campaign
 from ident.estimates.draft import measured_rows
-from ident.estimates.predict import METHODS, predicted
+from ident.estimates.predict import methods, predicted
 from ident.estimates.turning import Given
 from ident.fitting.fit import given_of
+from ident.validation.board import geometric_mean
 from ident.validation.boats import Boat, Fleet
 from ident.validation.result import Validation
-from ident.validation.scoreboard import geometric_mean
 from ident.validation.validate import errors, flights, validate
 from sim.boat.coefficients import Coefficients
 from sim.files.toml_files import bundled
@@ -35,7 +35,7 @@ def choices(db: str, campaign: Campaign) -> str:
     names = [n for n in bundled("cases") if load_case(n)[0].vehicle == VEHICLE and load_case(n)[0].reference]
     held = [one for one in (validate(n, db, fleet=fleet) for n in names) if one.errors]
     base, given = held[0].boat, given_of(campaign)
-    rows, every = measured_rows(base.rows), {m.name for m in METHODS}
+    rows, every = measured_rows(base.rows), {m.name for m in methods()}
 
     def flown(without: Collection[str] = (), told: Given = given) -> dict[str, float]:
         made = predicted(base.vehicle, rows, told, without)[0]
@@ -43,7 +43,7 @@ def choices(db: str, campaign: Campaign) -> str:
 
     whole, none = flown(), flown(every)
     found = {"measured only": none, "predicted": whole}
-    for name in (m.name for m in METHODS):
+    for name in (m.name for m in methods()):
         found[f"predicted without `{name}`"] = flown({name})
         found[f"measured only with `{name}`"] = flown(every - {name})
     found["predicted, nothing taken off by the source (5.2.5)"] = flown(told=replace(given, pure_yaw=(0.0, 0.5)))
