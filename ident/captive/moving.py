@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -22,6 +24,58 @@ _ANGLE = {"roll": "phi", "pitch": "theta", "yaw": "psi"}
 def axes_of(source: Source, header: CampaignFile) -> str:
     """What the loads of a source are along: ``body``, ``flow`` or ``tank``."""
     return source.axes or header.frame.axes
+
+
+@dataclass(frozen=True)
+class _Turn:
+    """Loads of an oscillation to the body's axes and its own moment point, sample by sample.
+
+    Attributes
+    ----------
+    motion : Of the body.
+    at : Load -> its channel. signs : (6,) of the frame, load by load. sense : Sign of the displacement.
+    point : Moment point that stays where the body moves from; None where it moves with the body.
+    swings : Whether the loads are along axes that do not turn with the body.
+    still : (3, 3) turn of the angles that the body stands at; None where it stands at none.
+    """
+
+    motion: str
+    at: dict[str, int]
+    signs: Array
+    sense: float
+    point: Array | None
+    swings: bool
+    still: Array | None
+
+    def __call__(self, time: Array, values: Array, displacement: Array) -> Array:
+        loads = np.full((len(values), 6), np.nan)
+        for k, o in enumerate(OUTPUTS):
+            if o in self.at:
+                loads[:, k] = values[:, self.at[o]] * self.signs[k]
+        moved = self.sense * displacement
+        whole = np.broadcast_to(np.eye(3), (len(moved), 3, 3))
+        swing = whole if self.motion in _ALONG else turned_by(self.motion, moved)
+        if self.point is not None:
+            loads[:, 3:] -= _cross(self._lever(self.point, moved, swing), loads[:, :3])
+        if self.swings or self.still is not None:
+            matrix = swing if self.swings else whole
+            if self.still is not None:
+                matrix = matrix @ self.still
+            for k in (0, 3):
+                loads[:, k : k + 3] = _product(matrix, loads[:, k : k + 3])
+        out = values.copy()
+        for k, o in enumerate(OUTPUTS):
+            if o in self.at:
+                out[:, self.at[o]] = loads[:, k] * self.signs[k]
+        return out
+
+    def _lever(self, point: Array, moved: Array, swing: Array) -> Array:
+        """Where the point went while the body turned about the vehicle's origin, or moved along."""
+        if self.motion not in _ALONG:
+            return np.einsum("nji,j->ni", swing, point) - point
+        lever = np.zeros((len(moved), 3))
+        lever[:, _ALONG[self.motion]] = moved
+        return lever
 
 
 def moving_body(
@@ -72,37 +126,16 @@ def moving_body(
     if not (swings or stands or carried):
         return None
     at = {o: names.index(o) for o in OUTPUTS if o in names}
-    signs = np.array([frame.sign(o) for o in OUTPUTS], dtype=float)
     sense = frame.sign(_ANGLE[rule.motion]) if turns else frame.sign("xyz"[_ALONG[rule.motion]])
-
-    def moved(time: Array, values: Array, displacement: Array) -> Array:
-        loads = np.full((len(values), 6), np.nan)
-        for k, o in enumerate(OUTPUTS):
-            if o in at:
-                loads[:, k] = values[:, at[o]] * signs[k]
-        own = sense * displacement
-        swing = turned_by(rule.motion or "", own) if turns else np.broadcast_to(np.eye(3), (len(own), 3, 3))
-        if carried:
-            if turns:
-                # Where the point went while the body turned about the vehicle's origin.
-                lever = np.einsum("nji,j->ni", swing, point) - point
-            else:
-                lever = np.zeros((len(own), 3))
-                lever[:, _ALONG[rule.motion or ""]] = own
-            loads[:, 3:] -= _cross(lever, loads[:, :3])
-        if swings or stands:
-            matrix = swing if swings else np.broadcast_to(np.eye(3), swing.shape)
-            if stands:
-                still = from_flow(np.array([alpha]), np.array([beta]))[0]
-                matrix = matrix @ still
-            for k in (0, 3):
-                loads[:, k : k + 3] = _product(matrix, loads[:, k : k + 3])
-        out = values.copy()
-        for k, o in enumerate(OUTPUTS):
-            if o in at:
-                out[:, at[o]] = loads[:, k] * signs[k]
-        return out
-
+    moved = _Turn(
+        motion=rule.motion,
+        at=at,
+        signs=np.array([frame.sign(o) for o in OUTPUTS], dtype=float),
+        sense=sense,
+        point=point if carried else None,
+        swings=swings,
+        still=from_flow(np.array([alpha]), np.array([beta]))[0] if stands else None,
+    )
     _measured(moved, names, at, where)
     return moved
 

@@ -95,15 +95,66 @@ def block_mesh(domain: Box) -> dict[str, Any]:
     }
 
 
+# What keeps a mesh usable, as the tutorials of OpenFOAM have it; the least volume is added by size.
+_QUALITY = {
+    "maxNonOrtho": 65,
+    "maxBoundarySkewness": 20,
+    "maxInternalSkewness": 4,
+    "maxConcave": 80,
+    "minTetQuality": 1e-15,
+    "minArea": -1,
+    "minTwist": 0.02,
+    "minDeterminant": 0.001,
+    "minFaceWeight": 0.05,
+    "minVolRatio": 0.01,
+    "minTriangleTwist": -1,
+    "nSmoothScale": 4,
+    "errorReduction": 0.75,
+}
+_SNAP = {
+    "nSmoothPatch": 3,
+    "tolerance": 2.0,
+    "nSolveIter": 30,
+    "nRelaxIter": 5,
+    "nFeatureSnapIter": 10,
+    "implicitFeatureSnap": True,
+    "explicitFeatureSnap": False,
+    "multiRegionFeatureSnap": False,
+}
+
+
+def _layers(template: Template, patches: list[str]) -> dict[str, Any]:
+    """How layers on the walls are added, where the template has any."""
+    layers = template.grid.layers
+    return {
+        "relativeSizes": True,
+        "layers": {name: {"nSurfaceLayers": layers.number} for name in patches} if layers else {},
+        "expansionRatio": layers.expansion if layers else 1.2,
+        "finalLayerThickness": layers.thickness if layers else 0.5,
+        "minThickness": 0.05 * layers.thickness if layers else 0.05,
+        "nGrow": 0,
+        "featureAngle": 120,
+        "nRelaxIter": 5,
+        "nSmoothSurfaceNormals": 1,
+        "nSmoothNormals": 3,
+        "nSmoothThickness": 10,
+        "maxFaceThicknessRatio": 0.5,
+        "maxThicknessToMedialRatio": 0.3,
+        "minMedianAxisAngle": 90,
+        "nBufferCellsNoExtrude": 0,
+        "nLayerIter": 50,
+    }
+
+
 def snappy(template: Template, patches: list[str], domain: Box, length: float) -> dict[str, Any]:
     """``system/snappyHexMeshDict``: ``levels`` on the walls, one less up to ``reach``, and so on, twice as far each."""
     levels, near = template.grid.levels, settings()["reach"] * length
     bands = [[near * 2**k, levels - 1 - k] for k in range(levels - 1)]
-    layers = template.grid.layers
+    walls = {name: {"level": [levels, levels], "patchInfo": {"type": "wall"}} for name in patches}
     return {
         "castellatedMesh": True,
         "snap": True,
-        "addLayers": layers is not None,
+        "addLayers": template.grid.layers is not None,
         "geometry": {f"{name}.stl": {"type": "triSurfaceMesh", "name": name} for name in patches},
         "castellatedMeshControls": {
             "maxLocalCells": 100000000,
@@ -111,57 +162,14 @@ def snappy(template: Template, patches: list[str], domain: Box, length: float) -
             "minRefinementCells": 0,
             "nCellsBetweenLevels": int(settings()["buffer"]),
             "features": [],
-            "refinementSurfaces": {
-                name: {"level": [levels, levels], "patchInfo": {"type": "wall"}} for name in patches
-            },
+            "refinementSurfaces": walls,
             "resolveFeatureAngle": 30,
             "refinementRegions": {name: {"mode": "distance", "levels": bands} for name in patches} if bands else {},
             "locationInMesh": domain.inside,
             "allowFreeStandingZoneFaces": False,
         },
-        "snapControls": {
-            "nSmoothPatch": 3,
-            "tolerance": 2.0,
-            "nSolveIter": 30,
-            "nRelaxIter": 5,
-            "nFeatureSnapIter": 10,
-            "implicitFeatureSnap": True,
-            "explicitFeatureSnap": False,
-            "multiRegionFeatureSnap": False,
-        },
-        "addLayersControls": {
-            "relativeSizes": True,
-            "layers": {name: {"nSurfaceLayers": layers.number} for name in patches} if layers else {},
-            "expansionRatio": layers.expansion if layers else 1.2,
-            "finalLayerThickness": layers.thickness if layers else 0.5,
-            "minThickness": 0.05 * layers.thickness if layers else 0.05,
-            "nGrow": 0,
-            "featureAngle": 120,
-            "nRelaxIter": 5,
-            "nSmoothSurfaceNormals": 1,
-            "nSmoothNormals": 3,
-            "nSmoothThickness": 10,
-            "maxFaceThicknessRatio": 0.5,
-            "maxThicknessToMedialRatio": 0.3,
-            "minMedianAxisAngle": 90,
-            "nBufferCellsNoExtrude": 0,
-            "nLayerIter": 50,
-        },
-        "meshQualityControls": {
-            "maxNonOrtho": 65,
-            "maxBoundarySkewness": 20,
-            "maxInternalSkewness": 4,
-            "maxConcave": 80,
-            "minVol": 1e-9 * domain.wall**3,
-            "minTetQuality": 1e-15,
-            "minArea": -1,
-            "minTwist": 0.02,
-            "minDeterminant": 0.001,
-            "minFaceWeight": 0.05,
-            "minVolRatio": 0.01,
-            "minTriangleTwist": -1,
-            "nSmoothScale": 4,
-            "errorReduction": 0.75,
-        },
+        "snapControls": dict(_SNAP),
+        "addLayersControls": _layers(template, patches),
+        "meshQualityControls": _QUALITY | {"minVol": 1e-9 * domain.wall**3},
         "mergeTolerance": 1e-6,
     }

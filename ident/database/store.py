@@ -18,6 +18,7 @@ from ident.captive.published import TEST as PUBLISHED
 from ident.database.leftovers import check_folder, remove_unfinished
 from ident.database.lock import WAIT, held
 from ident.identification.identify import Identification
+from ident.identification.nodes import Node
 from sim.boat.database import (
     NUMBERS,
     OPTIONAL,
@@ -31,7 +32,7 @@ from sim.boat.database import (
     whole_version,
 )
 from sim.boat.delta_log import LATEST, LOG, Entry, Log, has_versions, latest_said, seal
-from sim.boat.parts import parts_of, vehicle_terms
+from sim.boat.parts import Point, parts_of, vehicle_terms
 from sim.boat.row_codec import correlation_texts
 from sim.files.errors import InputError
 from sim.files.storage import address, brief, engine, flush, is_url
@@ -55,12 +56,27 @@ def no_rows() -> pd.DataFrame:
     return pd.DataFrame({c: pd.Series([], dtype=kinds[column_type(c)]) for c in column_order()})
 
 
-def database_rows(found: Identification) -> pd.DataFrame:
+def _runs_behind(node: Node, place: tuple[str, Point], sign: float, factor: dict[str, float]) -> dict[str, Any]:
+    """What a row says of the runs behind its value; a value that symmetry makes nothing has none."""
+    if not sign:
+        return {"n_runs": 0, "quality": "", "origin": "symmetry", "worst_residual": 0.0, "runs": ""}
+    seen = "published" if node.tests == {PUBLISHED} else "measured"
+    return {
+        "n_runs": len(set(node.runs)),
+        "quality": max(node.qualities, key=lambda q: factor[q]),
+        "origin": seen if place in node.seen else "mirror",
+        # Runs that agree leave rounding, which differs between processors.
+        "worst_residual": round(node.worst, _RESIDUAL_DIGITS),
+        "runs": " ".join(dict.fromkeys(node.runs)),
+    }
+
+
+def database_rows(identified: Identification) -> pd.DataFrame:
     """The rows of the database for one identified campaign, completed by symmetry.
 
     Parameters
     ----------
-    found : From ``identify``.
+    identified : From ``identify``.
 
     Returns
     -------
@@ -71,54 +87,44 @@ def database_rows(found: Identification) -> pd.DataFrame:
     InputError
         When the campaign identifies nothing, or a value is not finite.
     """
-    vehicle = found.campaign.vehicle
-    if found.campaign.runs.empty:
-        where = found.campaign.folder or found.campaign.header.name
+    vehicle = identified.campaign.vehicle
+    if identified.campaign.runs.empty:
+        where = identified.campaign.folder or identified.campaign.header.name
         allowed = "one CSV a test beside campaign.toml, or [[source]]; estimates from lines do without"
         raise InputError(where, "no CSV file of runs: the runs identify nothing", allowed)
     columns = {axis: column for column, axis in axis_columns().items()}
-    factor = {k: q.factor for k, q in found.campaign.header.quality.items()}
-    stderr = np.sqrt(np.clip(np.diag(found.covariance), 0.0, None))
-    correlated = correlation_texts(found.covariance)
+    factor = {k: q.factor for k, q in identified.campaign.header.quality.items()}
+    stderr = np.sqrt(np.clip(np.diag(identified.covariance), 0.0, None))
+    correlated = correlation_texts(identified.covariance)
     rows = []
     for term in vehicle_terms(vehicle):
         for part in parts_of(term, vehicle):
-            for point, index, sign in zip(*found.points(term, part), strict=True):
-                node = found.nodes[index]
-                seen = "published" if node.tests == {PUBLISHED} else "measured"
-                origin = seen if (part, point) in node.seen else "mirror"
+            for point, index, sign in zip(*identified.points(term, part), strict=True):
                 row: dict[str, Any] = {
                     "vehicle": vehicle.name,
                     "coefficient": term.name,
                     "part": part,
                     "output": term.output,
-                }
-                row |= {columns[a]: to_column(columns[a], x) for a, x in zip(term.axes, point, strict=True)}
-                row |= {
-                    "value": sign * found.values[index] + 0.0,
+                    "value": sign * identified.values[index] + 0.0,
                     "stderr": abs(sign) * stderr[index],
-                    "n_runs": len(set(node.runs)) if sign else 0,
-                    "quality": max(node.qualities, key=lambda q: factor[q]) if sign else "",
-                    "origin": origin if sign else "symmetry",
                     "estimated_by": "",
                     "measured_correlation": "",
                     "calibration": "",
                     "estimate": index if sign else -1,
                     "correlation": correlated.get(index, "") if sign else "",
-                    # Runs that agree leave rounding, which differs between processors.
-                    "worst_residual": round(node.worst, _RESIDUAL_DIGITS) if sign else 0.0,
                     "extrapolation": " ".join(f"{a}:{r}" for a, r in term.extrapolation.items()),
                     "equation": term.equation,
-                    "runs": " ".join(dict.fromkeys(node.runs)) if sign else "",
                 }
-                rows.append(row)
+                row |= {columns[a]: to_column(columns[a], x) for a, x in zip(term.axes, point, strict=True)}
+                rows.append(row | _runs_behind(identified.nodes[index], (part, point), sign, factor))
     # Twelve digits: far below any error, above the rounding that differs between machines.
     for row in rows:
         row |= {k: float(f"{row[k]:.12g}") for k in NUMBERS}
     if not rows:
-        raise InputError(found.campaign.header.name, "the runs identify nothing", "runs of at least one known test")
+        name = identified.campaign.header.name
+        raise InputError(name, "the runs identify nothing", "runs of at least one known test")
     table = pd.DataFrame(rows).reindex(columns=column_order())
-    _check_finite(table, found.campaign.header.name)
+    _check_finite(table, identified.campaign.header.name)
     return table
 
 

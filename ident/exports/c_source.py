@@ -231,11 +231,47 @@ def files() -> Environment:
     return Environment(loader=loader, trim_blocks=True, lstrip_blocks=True, undefined=StrictUndefined)
 
 
+def _of_the_boat(parts: _Parts, tanks: bool, name: str) -> dict[str, Any]:
+    """What templates are told of a boat, in whatever case."""
+    return {
+        "name": name,
+        "upper": name.upper(),
+        "guard": f"IDENT_{name.upper()}_H",
+        "states": STATES,
+        "tanks": tanks,
+        "sail_top": literal(parts.model.sail_top, "d"),
+        "fields": parts.members.fields,
+        "command_at": orders.COMMAND,
+        "n_low": literal(parts.settings.n_limit[0], "d"),
+        "n_high": literal(parts.settings.n_limit[1], "d"),
+        "room": _ROOM,
+        "wave_fields": _wave_fields(parts.around),
+    }
+
+
+def _of_the_flight(parts: _Parts, functions: str, level: Array) -> dict[str, Any]:
+    """What templates are told of where a flight starts, and of the tables that its functions use."""
+    kind_of = {
+        n: "i" if v.dtype.kind == "i" else ("f" if v.dtype.itemsize == 4 else "d")
+        for n, v in parts.members.starts.items()
+    }
+    started = {"state": parts.state, "controls": parts.controls, **parts.members.starts}
+    return {
+        "tables": [t for t in parts.members.tables if _names(t) in functions],
+        "starts": [
+            table(f"static const {SCALARS[kind_of.get(n, 'd')]} start_{n}", v, kind_of.get(n, "d"))
+            for n, v in started.items()
+        ],
+        "started": list(started),
+        "level": [literal(v, "d") for v in level],
+    }
+
+
 def _written(boat: Boat, case: Case, db: str, parts: _Parts) -> Source:
     """Both files from the parts of a boat."""
     from ident import __version__
 
-    name, members = identifier(boat.vehicle.name), parts.members
+    name = identifier(boat.vehicle.name)
     steps, every = samples_of(case)
     rows, columns = steps // every + 1, 15 + parts.controls.size
     translation, names = _translated(parts, rows, columns)
@@ -243,44 +279,25 @@ def _written(boat: Boat, case: Case, db: str, parts: _Parts) -> Source:
     commands = COMMANDS if tanks else COMMANDS[:3]
     level = (parts.trim.dV, parts.trim.dH) if parts.trim else (0.0, 0.0)
     start = np.array([*level, *parts.controls[len(boat.vehicle.planes) :]])
-    kind_of = {
-        n: "i" if v.dtype.kind == "i" else ("f" if v.dtype.itemsize == 4 else "d") for n, v in members.starts.items()
-    }
-    started = {"state": parts.state, "controls": parts.controls, **members.starts}
     version = f"version {boat.commit.number}, digest {boat.commit.digest}"
-    said = {
-        "title": f"{boat.vehicle.title}; {case.title}",
-        "source_line": f"Database {Path(db).name} {version}; case {case.name}.",
-        "program": __version__,
-        "name": name,
-        "upper": name.upper(),
-        "guard": f"IDENT_{name.upper()}_H",
-        "step": literal(case.run.step_s, "d"),
-        "states": STATES,
-        "controls": [p.name for p in boat.vehicle.planes] + ["n", *(("ballast", "trim_tank") if tanks else ())],
-        "commands": commands,
-        "tanks": tanks,
-        "sail_top": literal(parts.model.sail_top, "d"),
-        "rows": rows,
-        "columns": columns,
-        "fields": members.fields,
-        "tables": [t for t in members.tables if _names(t) in translation.text],
-        "starts": [
-            table(f"static const {SCALARS[kind_of.get(n, 'd')]} start_{n}", v, kind_of.get(n, "d"))
-            for n, v in started.items()
-        ],
-        "started": list(started),
-        "level": [literal(v, "d") for v in start],
-        "functions": translation.text,
-        "command_at": orders.COMMAND,
-        "n_low": literal(parts.settings.n_limit[0], "d"),
-        "n_high": literal(parts.settings.n_limit[1], "d"),
-        "samples": steps,
-        "every": every,
-        "room": _ROOM,
-        "wave_fields": _wave_fields(parts.around),
-        **{"prepare": "", **names},
-    }
+    said = (
+        _of_the_boat(parts, tanks, name)
+        | _of_the_flight(parts, translation.text, start)
+        | {
+            "title": f"{boat.vehicle.title}; {case.title}",
+            "source_line": f"Database {Path(db).name} {version}; case {case.name}.",
+            "program": __version__,
+            "step": literal(case.run.step_s, "d"),
+            "controls": [p.name for p in boat.vehicle.planes] + ["n", *(("ballast", "trim_tank") if tanks else ())],
+            "commands": commands,
+            "rows": rows,
+            "columns": columns,
+            "functions": translation.text,
+            "samples": steps,
+            "every": every,
+            **{"prepare": "", **names},
+        }
+    )
     header, source = (files().get_template(f"boat.{k}.j2").render(said) + "\n" for k in "hc")
     return Source(
         name=name,

@@ -212,6 +212,15 @@ def _with_one(columns: condense.Regressors) -> condense.Regressors:
     return lambda time: np.column_stack([np.ones(time.size), columns(time)])
 
 
+def _crossings(time: Array, values: Array, drift: int, channel: str) -> int:
+    """Zero crossings of a series without its drift. Raises ``InputError`` for fewer than ten."""
+    rough = values - np.polynomial.Polynomial.fit(time, values, max(drift, 0))(time)
+    crossings = upcrossings(rough).size
+    if crossings < _FEWEST_CROSSINGS:
+        raise InputError(f"statistics of {channel}", f"{crossings} zero crossings", f"{_FEWEST_CROSSINGS} or more")
+    return crossings
+
+
 def statistics_of(
     time: Array,
     values: Array,
@@ -239,11 +248,7 @@ def statistics_of(
     step = uniform_step(time)
     if not np.isfinite(values).all():
         raise InputError(f"statistics of {channel}", "values that are not finite", "finite numbers")
-    rough = values - np.polynomial.Polynomial.fit(time, values, max(drift, 0))(time)
-    crossings = upcrossings(rough).size
-    if crossings < _FEWEST_CROSSINGS:
-        raise InputError(f"statistics of {channel}", f"{crossings} zero crossings", f"{_FEWEST_CROSSINGS} or more")
-    blocks = _BLOCKS * crossings
+    blocks = _BLOCKS * _crossings(time, values, drift, channel)
     whole = _fit(time, values, _with_one(drift_columns(float(time[0]), float(time[-1]), drift)), blocks, cut=True)
     use = time >= whole.start - 0.5 * step if whole.cut else np.ones(time.size, dtype=bool)
     t, y = time[use], values[use]

@@ -226,6 +226,27 @@ def _records(shape: tuple[int, int, int]) -> Array:
     return records
 
 
+class _Stacks:
+    """Records and metrics of samples as they come."""
+
+    def __init__(self, case: Case, batch: Batch, samples: int) -> None:
+        steps, every = samples_of(case)
+        shape = (len(batch.channels), samples, steps // every + 1)
+        self.records = {source: _records(shape) for source in batch.flights}
+        self.flown = np.zeros(samples, dtype=bool)
+        self.metrics: dict[int, Values] = {}
+
+    def put(self, i: int, sample: Flown | None) -> None:
+        """Sample i, None where it has no state of self-propulsion."""
+        self.flown[i] = sample is not None
+        if sample is None:
+            return
+        self.metrics[i] = sample.metrics
+        for source, record in sample.records.items():
+            self.records[source][:, i, : record.shape[1]] = record
+            self.records[source][:, i, record.shape[1] :] = np.nan
+
+
 def _without_failed(stack: Array, flown: NDArray[np.bool_]) -> Array:
     """(channels, flown samples, records), channel by channel in place."""
     count = int(flown.sum())
@@ -307,24 +328,15 @@ def fly_samples(
     value = rows["value"].to_numpy()
     chunks = (value + np.where(index >= 0, draws[i : i + chunk, index] * step, 0.0) for i in range(0, samples, chunk))
     batch = batch_of(case, vehicle, rows)
-    steps, every = samples_of(case)
-    shape = (len(batch.channels), samples, steps // every + 1)
-    stacks = {source: _records(shape) for source in batch.flights}
-    flown = np.zeros(samples, dtype=bool)
-    metrics: dict[int, Values] = {}
+    stacks = _Stacks(case, batch, samples)
     for place, chunk_flown in over_dask(dask, batch, chunks) if dask else _over_threads(batch, chunks, workers):
         for i, one in enumerate(chunk_flown, start=place * chunk):
-            flown[i] = one is not None
-            if one is None:
-                continue
-            metrics[i] = one.metrics
-            for source, record in one.records.items():
-                stacks[source][:, i, : record.shape[1]] = record
-                stacks[source][:, i, record.shape[1] :] = np.nan
+            stacks.put(i, one)
         each(len(chunk_flown))
+    flown = stacks.flown
     if not flown.any():
         raise InputError(f"case {case.name}", "no sample has a self-propulsion state", "smaller errors or another case")
-    kept = {source: _without_failed(stack, flown) for source, stack in stacks.items()}
+    kept = {source: _without_failed(stack, flown) for source, stack in stacks.records.items()}
     time, channels = _up_to_the_end(case, batch, kept)
     return Bands(
         time=time,
@@ -335,7 +347,7 @@ def fly_samples(
         estimates=list(estimates["coefficient"]),
         failed=int(samples - flown.sum()),
         seed=seed,
-        metrics=tuple(metrics[i] for i in sorted(metrics)),
+        metrics=tuple(stacks.metrics[i] for i in sorted(stacks.metrics)),
     )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +11,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from ident.drawing import margins
-from ident.metrics.exceedance import Side, exceedances, rice_rate
+from ident.metrics.exceedance import Exceedance, Side, exceedances, rice_rate
 from ident.metrics.seakeeping import Harmonics, as_published
 from ident.metrics.seaway import Statistics, spectrum, uniform_step
 from ident.text import in_figure
@@ -144,6 +144,17 @@ def spectrum_figure(
     return finish(figure, path, title, stamp)
 
 
+def _counted(axis: Any, levels: Array, each: Sequence[Exceedance]) -> None:
+    """Crossings that were counted, where there are any, with the error of counting."""
+    counted = np.array([(v, e.per_hour, e.per_hour_stderr) for v, e in zip(levels, each, strict=True) if e.count])
+    if not counted.size:
+        return
+    # An error bar as long as the rate has no lower end on this axis.
+    bars = [np.minimum(counted[:, 2], 0.9 * counted[:, 1]), counted[:, 2]]
+    label = "counted ± Poisson error"
+    axis.errorbar(*counted[:, :2].T, yerr=bars, color="tab:red", fmt="o", ms=3, lw=0.8, label=label)
+
+
 def exceedance_figure(
     of: Statistics, path: Path, title: str, stamp: str, side: Side = "below", level: float | None = None
 ) -> Path:
@@ -183,24 +194,18 @@ def exceedance_figure(
         lw=0,
         label="± 2 standard errors of mean and sigma",
     )
-    counted = np.array([(v, e.per_hour, e.per_hour_stderr) for v, e in zip(shown, each, strict=True) if e.count])
-    if counted.size:
-        # An error bar as long as the rate has no lower end on this axis.
-        down = np.minimum(counted[:, 2], 0.9 * counted[:, 1])
-        bars = [down, counted[:, 2]]
-        axis.errorbar(
-            *counted[:, :2].T, yerr=bars, color="tab:red", fmt="o", ms=3, lw=0.8, label="counted ± Poisson error"
-        )
+    _counted(axis, shown, each)
     hours = (of.end - of.start) / 3600.0
     axis.axhline(1.0 / hours, color="k", ls=":", lw=0.9, label=f"once in the record of {hours:.3g} h")
+    bottom = 0.1 / hours
     if level is not None:
+        expected = rice_rate(of, level)
         mark = float(readable(of.channel, np.array(level))[0])
-        text = f"{mark:g} {unit}: Rice {rice_rate(of, level):.2g} a hour"
         # A level that is never reached is named only: it would squeeze all that is reached.
-        place = mark if rice_rate(of, level) > _LEAST else np.nan
+        place = mark if expected > _LEAST else np.nan
+        text = f"{mark:g} {unit}: Rice {expected:.2g} a hour"
         axis.axvline(place, color="tab:green", ls="--", lw=1.0, label=text)
-    known = level is not None and rice_rate(of, level) > _LEAST
-    bottom = min(0.1 / hours, 0.3 * rice_rate(of, float(level or 0.0))) if known else 0.1 / hours
+        bottom = min(bottom, 0.3 * expected) if expected > _LEAST else bottom
     axis.set_ylim(max(bottom, _LEAST), 2.0 * rate.max())
     dress(axis, f"level of {name} [{unit}]", f"crossings to {side} the level [1/h]")
     axis.legend(fontsize=8, frameon=False)

@@ -14,6 +14,7 @@ import numpy as np
 from sim.bench.boat import frozen_boat
 from sim.bench.loops import rates, steps
 from sim.boat.coefficients import Coefficients
+from sim.boat.mass import Environment
 from sim.flight.case import Case, load_case
 from sim.flight.plant import Plant
 from sim.flight.simulate import environment_of, fly, samples_of, simulate
@@ -69,6 +70,14 @@ def _voyages(model: Model, states: np.ndarray, controls: np.ndarray, h: float, _
         voyage()
 
 
+def _waters(coefficients: Coefficients, environment: Environment) -> list[Water]:
+    """Sea state 5 as one regular wave, and as a spectrum of components."""
+    state, density, gravity = sea_state(5), environment.density, environment.gravity
+    one = regular(state.height, gravity * state.period**2 / (2.0 * np.pi), np.pi, density, gravity)
+    many = realise(Spectrum("bretschneider", state.height, state.period, np.pi, 5.0), COMPONENTS, 1, density, gravity)
+    return [water_around(coefficients, environment, waves) for waves in (one, many)]
+
+
 def ratios(tries: int = 300, say: Callable[[str], None] = lambda text: None) -> dict[str, Any]:
     """Times and ratios of the right-hand side, a step, a batch of flights and a plant.
 
@@ -88,11 +97,7 @@ def ratios(tries: int = 300, say: Callable[[str], None] = lambda text: None) -> 
     work, dy, h = workspace(model), np.zeros(12), case.run.step_s
     flat = (model.real, model.whole)
     few = range(0, len(states), len(states) // _FEW)
-    state = sea_state(5)
-    density, gravity = environment.density, environment.gravity
-    one = regular(state.height, gravity * state.period**2 / (2.0 * np.pi), np.pi, density, gravity)
-    many = realise(Spectrum("bretschneider", state.height, state.period, np.pi, 5.0), COMPONENTS, 1, density, gravity)
-    waters = [water_around(coefficients, environment, waves) for waves in (one, many)]
+    waters = _waters(coefficients, environment)
     calls: dict[str, Callable[[], object]] = {
         "rhs": lambda: rates(*flat, states, controls, work.real, work.whole, dy),
         "calm": _voyage(model, states, controls, h, None),

@@ -60,6 +60,35 @@ _NAMES = ("pitch", "dV", *TANK_NAMES)
 _BALANCED = 1e-8
 
 
+def _search(
+    model: Model,
+    mixer: Array,
+    speed: float,
+    depth: float,
+    free: tuple[str, ...],
+    values: dict[str, float],
+    upright: bool,
+) -> Search:
+    """What the balances are worked out in."""
+    work = workspace(model)
+    planes, tanks = mixer.shape[0], len(TANK_NAMES) if model.has_tanks else 0
+    return Search(
+        *(model.real, model.whole, work.real, work.whole),
+        speed=float(speed),
+        z=float(depth - model.sail_top),
+        mixer=np.ascontiguousarray(mixer),
+        free=np.array([_NAMES.index(k) for k in free]),
+        level=np.array([values[k] for k in _NAMES]),
+        # Ballast by what balances 1 % of the weight.
+        size=np.array([1.0, 1.0, 0.01 * model.mass, 1.0]),
+        upright=bool(upright),
+        y=np.zeros(12),
+        c=np.zeros(planes + 1 + tanks),
+        dy=np.zeros(12),
+        a=np.zeros(SCRATCH),
+    )
+
+
 def _solve(
     model: Model,
     mixer: Array,
@@ -75,26 +104,7 @@ def _solve(
     -------
     The state found and, if it is no equilibrium, what is wrong with it.
     """
-    work = workspace(model)
-    planes, tanks = mixer.shape[0], len(TANK_NAMES) if model.has_tanks else 0
-    # Ballast by what balances 1 % of the weight.
-    size = np.array([1.0, 1.0, 0.01 * model.mass, 1.0])
-    level = np.array([values[k] for k in _NAMES])
-    unknown = np.array([_NAMES.index(k) for k in free])
-    search = Search(
-        *(model.real, model.whole, work.real, work.whole),
-        speed=float(speed),
-        z=float(depth - model.sail_top),
-        mixer=np.ascontiguousarray(mixer),
-        free=unknown,
-        level=level,
-        size=size,
-        upright=bool(upright),
-        y=np.zeros(12),
-        c=np.zeros(planes + 1 + tanks),
-        dy=np.zeros(12),
-        a=np.zeros(SCRATCH),
-    )
+    search = _search(model, mixer, speed, depth, free, values, upright)
     state, derivative, controls = search.y, search.dy, search.c
 
     def residual(x: Array) -> Array:
@@ -121,7 +131,7 @@ def _solve(
     # Along north through the water, whatever carries it.
     state[11] = -np.arctan2(derivative[7] - model.current[1], derivative[6] - model.current[0])
     lateral = float(x[3]) if upright else 0.0
-    return Trim(state, controls, float(level[DV]), float(x[5]), left, lateral=lateral), wrong
+    return Trim(state, controls, float(search.level[DV]), float(x[5]), left, lateral=lateral), wrong
 
 
 def _closest(state: Array, controls: Array, mixer: Array) -> str:
