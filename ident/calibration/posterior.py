@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from ident.calibration.estimate import Estimate, discrepancies
 from ident.calibration.problem import Problem
-from sim.files.errors import InputError
+from sim.files.extras import library
 
 Array = NDArray[np.float64]
 
@@ -108,11 +108,7 @@ def emcee() -> Any:
     InputError
         When the extra is not installed.
     """
-    try:
-        import emcee as found
-    except ImportError as error:
-        raise InputError("--posterior", "emcee is not installed", "pip install 'ident-submarine[posterior]'") from error
-    return found
+    return library("emcee", "posterior", "--posterior")
 
 
 def log_density(task: Problem, theta: Array) -> float:

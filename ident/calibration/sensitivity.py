@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from ident.calibration.problem import Problem
 from sim.files.errors import InputError
+from sim.files.extras import library
 
 Array = NDArray[np.float64]
 
@@ -70,12 +71,7 @@ def salib() -> tuple[Any, Any]:
     InputError
         When the extra is not installed.
     """
-    try:
-        from SALib.analyze import sobol as analyse
-        from SALib.sample import sobol as drawn
-    except ImportError as error:
-        text = "pip install 'ident-submarine[posterior]'"
-        raise InputError("--sensitivity", "SALib is not installed", text) from error
+    drawn, analyse = (library(f"SALib.{m}.sobol", "posterior", "--sensitivity") for m in ("sample", "analyze"))
     return drawn, analyse
 
 

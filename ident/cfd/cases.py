@@ -17,7 +17,7 @@ from ident.cfd import scripts
 from ident.cfd.grids import Box, block_mesh, box, snappy
 from ident.cfd.motions import Motion
 from ident.cfd.template import Template
-from sim.files.errors import InputError
+from sim.files.extras import library
 from sim.hull.mesh import Mesh
 
 Array = NDArray[np.float64]
@@ -74,13 +74,10 @@ def write_dictionary(path: Path, entries: Entries) -> None:
     InputError
         When foamlib is not installed.
     """
-    try:
-        from foamlib import FoamFile
-    except ImportError as error:
-        raise InputError("cases", "foamlib is not installed", "pip install 'ident-submarine[cfd]'") from error
+    foamlib = library("foamlib", "cfd", "cases")
 
     def make() -> None:
-        with FoamFile(path) as file:
+        with foamlib.FoamFile(path) as file:
             for key, value in entries.items():
                 file[key] = value
 

@@ -13,7 +13,7 @@ from ident.cfd.case import Case
 from ident.cfd.motions import motion_word
 from ident.cfd.template import Template, settings
 from sim.boat.vehicle import Vehicle
-from sim.files.errors import InputError
+from sim.files.extras import library
 from sim.files.schema import checked
 
 _UNITS = {"U": "mps", "D0": "m", "alpha": "deg", "beta": "deg", "plane": "deg"}
@@ -31,10 +31,7 @@ def write_campaign(out: Path, cases: Sequence[Case], vehicle: Vehicle, vehicle_f
     vehicle, vehicle_file : The boat, and its bundled name or a path.
     template : Density, scale, errors.
     """
-    try:
-        import tomli_w
-    except ImportError as error:
-        raise InputError("cases", "tomli-w is not installed", "pip install 'ident-submarine[cfd]'") from error
+    tomli_w = library("tomli_w", "cfd", "cases", "tomli-w")
     path = out / "campaign.toml"
     data = header(out, vehicle, vehicle_file, template)
     data["source"] = [source(case, template) for case in cases]

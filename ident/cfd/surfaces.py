@@ -12,6 +12,7 @@ from ident.cfd.template import UNITS, Template
 from sim.boat.vehicle import Plane, Vehicle
 from sim.files.constants import constant
 from sim.files.errors import InputError
+from sim.files.extras import library
 from sim.hull.added_mass import panel_added_mass, wetted_panels
 from sim.hull.mesh import Mesh, MeshError, joined
 from sim.hull.surface import read_geometry
@@ -115,10 +116,7 @@ def read_surface(path: Path, template: Template, vehicle: Vehicle, where: str) -
 
 def _read(path: Path) -> dict[str, tuple[Array, NDArray[np.int64]]]:
     """Patch -> vertices as written and triangles, equal vertices merged."""
-    try:
-        import trimesh
-    except ImportError as error:
-        raise InputError("surface", "trimesh is not installed", "pip install 'ident-submarine[cfd]'") from error
+    trimesh = library("trimesh", "cfd", "surface")
     paths = sorted(path.glob("*.stl")) if path.is_dir() else [path]
     if not paths or not all(p.is_file() and p.suffix.lower() == ".stl" for p in paths):
         found = (

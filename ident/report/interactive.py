@@ -19,7 +19,7 @@ from sim.boat import catalogue
 from sim.boat.catalogue import Term
 from sim.boat.parts import vehicle_terms
 from sim.boat.vehicle import Vehicle
-from sim.files.errors import InputError
+from sim.files.extras import library
 from sim.files.frames import PROGRAM
 
 if TYPE_CHECKING:
@@ -49,11 +49,7 @@ def plotly() -> Any:
     InputError
         When the extra is not installed.
     """
-    try:
-        import plotly.graph_objects as go
-    except ImportError as error:
-        raise InputError("--interactive", "plotly is not installed", "pip install 'ident-submarine[report]'") from error
-    return go
+    return library("plotly.graph_objects", "report", "--interactive")
 
 
 def _title(name: str) -> str:

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.files.errors import InputError
+from sim.files.extras import library
 from sim.hull.mesh import Mesh
 
 if TYPE_CHECKING:
@@ -90,12 +91,7 @@ def panel_added_mass(
     InputError
         When capytaine is not installed, or the body is not fully submerged.
     """
-    try:
-        import capytaine as cpt
-    except ImportError as error:
-        raise InputError(
-            "panel method", "capytaine is not installed", "pip install 'ident-submarine[panels]'"
-        ) from error
+    cpt = library("capytaine", "panels", "panel method")
     top = -mesh.corners[:, :, 2].min()
     if depth <= top:
         raise InputError("depth of the origin", f"{depth} m", f"more than {top:.4g} m: fully submerged")
