@@ -133,6 +133,15 @@ def _before(channels: Channels, name: str, time: float, window: float) -> float:
     return float(np.mean(channels[name][inside])) if inside.any() else float(np.interp(time, t, channels[name]))
 
 
+def _steady_points(
+    channels: Channels, name: str, ends: list[tuple[float, float]], window: float
+) -> list[tuple[float, float]]:
+    """What each step orders, and the mean of a channel over the window [s] before the step's end; both in degrees."""
+    return [
+        (float(np.degrees(ordered)), float(np.degrees(_before(channels, name, end, window)))) for ordered, end in ends
+    ]
+
+
 def _branches(points: list[tuple[float, float]]) -> tuple[Array, Array]:
     """The points of a spiral on its way down and on its way back, each by growing rudder."""
     array = np.array(points)
@@ -172,7 +181,7 @@ def direct_spiral(channels: Channels, ends: list[tuple[float, float]]) -> tuple[
     """
     if not ends:
         return dict.fromkeys(("loop_height_degps", "loop_width_deg")), []
-    points = [(float(np.degrees(dh)), float(np.degrees(_before(channels, "r", end, 5.0)))) for dh, end in ends]
+    points = _steady_points(channels, "r", ends, 5.0)
     down, up = _branches(points)
     metrics: Metrics = {}
     for name, branch in (("down", down), ("up", up)):
@@ -216,7 +225,7 @@ def reverse_spiral(channels: Channels, ends: list[tuple[float, float]]) -> tuple
     """
     if len(ends) < 2:
         return dict.fromkeys(("slope_at_zero_deg_per_degps", "loop_width_deg")), []
-    points = [(float(np.degrees(r)), float(np.degrees(_before(channels, "dH", end, 30.0)))) for r, end in ends]
+    points = _steady_points(channels, "dH", ends, 30.0)
     rate, rudder = np.array(sorted(points)).T
     metrics: Metrics = {f"rudder_{r:+g}_degps_deg": d for r, d in sorted(points)}
     i = int(np.clip(np.searchsorted(rate, 0.0), 1, len(rate) - 1))
@@ -242,8 +251,7 @@ def pull_out(channels: Channels, ends: list[tuple[float, float]]) -> Metrics:
     """
     metrics: Metrics = {}
     turns = residuals = 0
-    for dh, end in ends:
-        rate = float(np.degrees(_before(channels, "r", end, 5.0)))
+    for dh, rate in _steady_points(channels, "r", ends, 5.0):
         if dh != 0.0:
             turns += 1
             metrics[f"turn_{turns}_degps"] = rate
