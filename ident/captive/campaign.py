@@ -27,15 +27,12 @@ from ident.captive.conversions import (
     deflected_left_out,
     move_moments,
     standard_errors,
-    tare_applies,
     to_full_scale,
     turn,
     whole_model,
-    without_hydrostatics,
-    without_inertia,
-    without_tare,
 )
 from ident.captive.histories import Reduced
+from ident.captive.other_loads import tare_applies, without_hydrostatics, without_inertia, without_tare
 from ident.captive.readers.opening import inputs
 from ident.captive.run_table import DIRECT, MEASURED, NUMBERS, run_table, sigma
 from ident.captive.runs import Found, source_runs

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ident.captive.quantities import Column, owner
-from ident.captive.readers.table import Sheet, run_blocks
+from ident.captive.readers.sheet import Sheet, run_blocks
 from ident.captive.readers.text import LARGEST, odd
 from ident.captive.run_table import DIRECT, sigma
 from ident.captive.source import Source

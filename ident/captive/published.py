@@ -11,7 +11,7 @@ import math
 import pandas as pd
 
 from ident.captive.campaign_file import CampaignFile
-from ident.captive.conversions import normalisations, product
+from ident.captive.dimensions import normalisations, product
 from ident.captive.quantities import PRIMED, powers_of
 from sim.boat.catalogue import ACCELERATIONS, OUTPUTS, Term
 from sim.boat.parts import vehicle_terms

@@ -14,8 +14,8 @@ import pandas as pd
 from ident.captive.campaign_file import CampaignFile
 from ident.captive.cells import Cells, read_cells
 from ident.captive.channels import Channels, NotRising
-from ident.captive.conversions import dimensional
 from ident.captive.deduction import thrust_deduction
+from ident.captive.dimensions import dimensional
 from ident.captive.foam_histories import foam_channels
 from ident.captive.grids import with_discretisation
 from ident.captive.histories import Reduced, reduce
@@ -23,7 +23,8 @@ from ident.captive.moving import axes_of, moving_body, refuse_tables
 from ident.captive.oscillation import states
 from ident.captive.quantities import Column, owner
 from ident.captive.readers.opening import matching, on_coarser_grids, open_sheet, reader_of
-from ident.captive.readers.table import Sheet, columns_of
+from ident.captive.readers.sheet import Sheet
+from ident.captive.readers.sheet_columns import columns_of
 from ident.captive.readers.times import unit_of
 from ident.captive.run_table import REQUIRED, TEXT
 from ident.captive.source import NO_COLUMNS, Reduction, Source, idle_keys

@@ -8,7 +8,7 @@ from typing import Any
 
 import pandas as pd
 
-from ident.captive.conversions import quantity_of
+from ident.captive.other_loads import quantity_of
 from ident.captive.patterns import search
 from ident.captive.quantities import column, owner, suffixed
 from ident.captive.readers.text import Dialect

@@ -14,9 +14,10 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from ident.captive.campaign_file import CampaignFile
-from ident.captive.conversions import dimensional
+from ident.captive.dimensions import dimensional
 from ident.captive.quantities import TAKEN, Column, column, owner
-from ident.captive.readers.table import Sheet, position
+from ident.captive.readers.sheet import Sheet
+from ident.captive.readers.sheet_columns import position
 from ident.captive.source import Source, Subtract
 from sim.boat.catalogue import OUTPUTS
 from sim.files.errors import InputError

@@ -18,7 +18,7 @@ import pandas as pd
 
 from ident.captive.campaign import Campaign
 from ident.captive.readers.opening import open_sheet
-from ident.captive.readers.table import run_cells
+from ident.captive.readers.sheet import run_cells
 from ident.captive.source import Source
 from ident.checks import axes as checks_axes
 from ident.checks import copies as checks_copies

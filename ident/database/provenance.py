@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from ident.captive.campaign import Campaign
-from ident.captive.conversions import tare_applies
+from ident.captive.other_loads import tare_applies
 from ident.captive.run_table import MOTION
 from ident.timeseries.reduction import ERROR, TRANSIENT
 from sim.boat.catalogue import OUTPUTS

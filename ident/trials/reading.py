@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ident.captive.quantities import is_unit, split
 from ident.captive.readers.opening import open_sheet, reader_of
-from ident.captive.readers.table import Sheet
+from ident.captive.readers.sheet import Sheet
 from ident.captive.readers.text import COMMENTS, head
 from ident.captive.source import Source
 from ident.checks.findings import Finding

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ident.captive.quantities import owner, split, suffixed
-from ident.captive.readers.table import Sheet, once
+from ident.captive.readers.sheet import Sheet, once
 from ident.captive.readers.text import LARGEST, Dialect
 from ident.captive.readers.times import Clocks
 from ident.captive.source import Source

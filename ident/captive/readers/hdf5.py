@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ident.captive.readers.arrays import array_sheet, chosen, needs, with_units
-from ident.captive.readers.table import Sheet
+from ident.captive.readers.sheet import Sheet
 from ident.captive.source import Source
 from sim.files.errors import InputError
 

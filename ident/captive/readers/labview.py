@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from ident.captive.readers.arrays import array_sheet, chosen, needs, with_units
-from ident.captive.readers.table import Sheet, open_csv
+from ident.captive.readers.sheet import Sheet
+from ident.captive.readers.table import open_csv
 from ident.captive.readers.text import head
 from ident.captive.source import Source
 from sim.files.errors import InputError

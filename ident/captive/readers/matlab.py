@@ -9,7 +9,7 @@ import numpy as np
 
 from ident.captive.readers.arrays import array_sheet, chosen
 from ident.captive.readers.hdf5 import open_hdf5
-from ident.captive.readers.table import Sheet
+from ident.captive.readers.sheet import Sheet
 from ident.captive.source import Source
 from sim.files.errors import InputError
 

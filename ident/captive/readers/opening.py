@@ -10,9 +10,10 @@ from ident.captive.readers.hdf5 import open_hdf5, open_netcdf
 from ident.captive.readers.labview import open_lvm, open_tdms
 from ident.captive.readers.matlab import open_matlab
 from ident.captive.readers.parquet import open_parquet
+from ident.captive.readers.sheet import Sheet
 from ident.captive.readers.solvers import fluent_header, open_fluent, open_plots, open_su2, open_tecplot, plots
 from ident.captive.readers.spreadsheet import open_workbook
-from ident.captive.readers.table import Sheet, open_columns, open_csv
+from ident.captive.readers.table import open_columns, open_csv
 from ident.captive.readers.text import COMMENTS, Lines, head, opened, sniff
 from ident.captive.readers.universal import open_universal
 from ident.captive.source import Source

@@ -10,7 +10,8 @@ from pathlib import Path
 import numpy as np
 
 from ident.captive.readers.arrays import array_sheet, chosen
-from ident.captive.readers.table import Sheet, open_columns, open_csv
+from ident.captive.readers.sheet import Sheet
+from ident.captive.readers.table import open_columns, open_csv
 from ident.captive.readers.text import Dialect, blocks, head
 from ident.captive.source import Source
 from sim.files.errors import InputError

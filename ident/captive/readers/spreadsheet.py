@@ -8,7 +8,7 @@ from typing import Any
 
 from ident.captive.patterns import search
 from ident.captive.readers.arrays import array_sheet, chosen, needs
-from ident.captive.readers.table import Sheet
+from ident.captive.readers.sheet import Sheet
 from ident.captive.source import Source
 from sim.files.errors import InputError
 

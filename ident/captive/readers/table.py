@@ -6,74 +6,26 @@ file of any size is read in bounded memory.
 
 from __future__ import annotations
 
-import fnmatch
 import itertools
 import re
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
 from ident.captive.patterns import search
-from ident.captive.quantities import Column, column, owner, split
+from ident.captive.readers.sheet import Sheet, ignored, once
 from ident.captive.readers.text import COMMENTS, Dialect, Lines, blocks, decimal_mark, head, numbers, sniff
 from ident.captive.readers.times import Clocks
 from ident.captive.source import Source
 from sim.files.errors import InputError
 
 Array = NDArray[np.float64]
-# Rows of a table of runs that are text at once.
-_BLOCK = 1 << 14
 # Rows at the end of a history that may lack cells: what a run that is still being written leaves.
 _MOST_UNFINISHED = 10
 _NO_DATA = "; skip = '...' in [[source]] leaves out lines that are no data"
-
-
-@dataclass(frozen=True)
-class Sheet:
-    """An open table.
-
-    Attributes
-    ----------
-    path : The file.
-    header_row : Row of the header.
-    header : Column headers as they stand there.
-    numbers : Wanted column positions, and that of the column that may hold clock times -> blocks
-        (rows, wanted) of finite numbers.
-    cells : Blocks of (file row, cells as text), for a table of runs.
-    dialect : How its numbers are written.
-    first_row : Row where the data begin.
-    spacers : Columns without a name that are empty.
-    """
-
-    path: Path
-    header_row: int
-    header: list[str]
-    numbers: Callable[..., Iterator[Array]]
-    cells: Callable[[], Iterator[tuple[int, list[str]]]]
-    dialect: Dialect
-    first_row: int = 2
-    spacers: tuple[str, ...] = ()
-
-    @property
-    def where(self) -> str:
-        """The header, for errors."""
-        return f"{self.path}, row {self.header_row} (header)"
-
-
-def ignored(header: str, source: Source) -> bool:
-    """Whether the campaign leaves a column out."""
-    return any(fnmatch.fnmatchcase(h, p) for h in (header, split(header)[0]) for p in source.ignore)
-
-
-def once(where: str, header: list[str], source: Source) -> None:
-    """Refuse a column that stands twice and is not left out."""
-    for name in header:
-        if header.count(name) > 1 and not ignored(name, source):
-            raise InputError(where, f"column {name[:60]!r} stands twice", "each column once, or in ignore")
 
 
 def _blocks(path: Path, source: Source, comments: tuple[str, ...] = COMMENTS) -> Iterator[Lines]:
@@ -159,14 +111,14 @@ def _text_sheet(path: Path, source: Source, dialect: Dialect, header: list[str],
     def cells() -> Iterator[tuple[int, list[str]]]:
         for block in data():
             for row, line in zip(block.rows, block.text, strict=True):
-                found = dialect.cells(line, f"{path}, row {row}")
-                while len(found) > len(header) and not found[-1]:
-                    found.pop()
-                if len(found) > len(header):
+                texts = dialect.cells(line, f"{path}, row {row}")
+                while len(texts) > len(header) and not texts[-1]:
+                    texts.pop()
+                if len(texts) > len(header):
                     text = f"at most {len(header)}, as in the header"
-                    raise InputError(f"{path}, row {row}", f"{len(found)} cells", text)
+                    raise InputError(f"{path}, row {row}", f"{len(texts)} cells", text)
                 # Spreadsheets drop blank cells at the end of a row.
-                yield row, found + [""] * (len(header) - len(found))
+                yield row, texts + [""] * (len(header) - len(texts))
 
     once(f"{path}, row {first.rows[0]} (header)", header, source)
     return Sheet(path, first.rows[0], header, values, cells, dialect, skip + 1)
@@ -301,124 +253,3 @@ def header_names(line: str) -> list[str]:
     if len(wide) > 1:
         return wide
     return re.findall(r"[^\s\[(]+(?:\s?[\[(][^\])]*[\])])?", text)
-
-
-def position(sheet: Sheet, name: str) -> int:
-    """Where a column of ``[[source.subtract]]`` stands, by its whole header or the header without its unit.
-
-    Raises
-    ------
-    InputError
-        When there is none.
-    """
-    for names in (sheet.header, [split(h)[0] for h in sheet.header]):
-        if name in names:
-            return names.index(name)
-    shown = ", ".join(sheet.header)[:200]
-    raise InputError(sheet.where, f"no column {name[:60]!r}, which [[source.subtract]] names", shown)
-
-
-def columns_of(sheet: Sheet, source: Source, text: tuple[str, ...]) -> list[Column | None]:
-    """What every column of a sheet is; None for ignored and text columns.
-
-    Parameters
-    ----------
-    sheet : The open table.
-    source : Its ``columns``, ``patterns`` and ``ignore``; columns of ``subtract`` are passed over.
-    text : Names of the text columns of a run table.
-
-    Raises
-    ------
-    InputError
-        For an unknown column or unit, a pattern that fits no or several columns, or two
-        columns of one quantity.
-    """
-    by_pattern = _by_pattern(sheet, source)
-    parts = {position(sheet, name) for one in source.subtract for name in one.columns}
-    found: list[Column | None] = []
-    for i, header in enumerate(sheet.header):
-        name = split(header)[0]
-        declared = by_pattern.get(header) or source.columns.get(header) or source.columns.get(name)
-        if header in sheet.spacers:
-            found.append(None)
-        elif i in parts:
-            if declared is not None:
-                found_twice = f"column {header[:60]!r} in [[source.subtract]] and in [source.columns] or patterns"
-                raise InputError(sheet.where, found_twice, "one of the two")
-            found.append(None)
-        elif (declared is None and (source.patterns or ignored(header, source))) or (declared or header) in text:
-            found.append(None)
-        else:
-            factored = any(n in source.factor for n in (header, name))
-            found.append(_times(column(header, declared, sheet.where, factored), source, sheet.where))
-    for key in source.columns:
-        if key not in sheet.header and key not in [split(h)[0] for h in sheet.header]:
-            shown = ", ".join(sheet.header)[:200]
-            raise InputError(sheet.where, f"no column {key[:60]!r}, which [source.columns] names", shown)
-    quantities = [c.quantity for c in found if c]
-    for quantity in quantities:
-        if quantities.count(quantity) > 1:
-            raise InputError(sheet.where, f"{quantity} stands twice", "one column a quantity")
-    return found
-
-
-def _times(kind: Column, source: Source, where: str) -> Column:
-    """A column with the factor that ``[source.factor]`` puts on it, by its header or its quantity."""
-    names = [n for n in dict.fromkeys((kind.name, split(kind.name)[0], kind.quantity)) if n in source.factor]
-    load = owner(kind.quantity)
-    if not names and load in source.factor and kind.quantity != load:
-        # A load's factor is its standard error's and its harmonics' as well.
-        names = [load]
-    if not names:
-        return kind
-    if len(names) > 1:
-        raise InputError(f"{where}, column {kind.name[:60]!r}", f"factors under {' and '.join(names)}", "one factor")
-    value = source.factor[names[0]]
-    return replace(kind, factor=kind.factor * (abs(value) if kind.quantity.startswith("s_") else value))
-
-
-def _by_pattern(sheet: Sheet, source: Source) -> dict[str, str]:
-    """Header -> declared quantity, by the regular expressions of ``patterns``."""
-    if not (source.patterns or source.columns) and any(re.search(r"\bMonitor\b", h) for h in sheet.header):
-        text = "a table [source.patterns] that names the monitors, see docs/readers.md"
-        raise InputError(sheet.where, "monitors without names", text)
-    found: dict[str, str] = {}
-    for pattern, quantity in source.patterns.items():
-        fits = [h for h in sheet.header if search(pattern, h)]
-        if len(fits) != 1 or fits[0] in found:
-            shown = ", ".join(repr(h[:60]) for h in (fits or sheet.header)[:8])
-            number = "no column fits" if not fits else "more than one fit"
-            raise InputError(sheet.where, f"{number} pattern {pattern!r}", f"one column a pattern; here: {shown}")
-        found[fits[0]] = quantity
-    return found
-
-
-def run_blocks(sheet: Sheet) -> Iterator[tuple[list[int], list[tuple[str, ...]]]]:
-    """A table of runs, some thousand rows at a time: their file rows, and the cells of every column as text.
-
-    Raises
-    ------
-    InputError
-        When there is no row.
-    """
-    cells = sheet.cells()
-    block = list(itertools.islice(cells, _BLOCK))
-    if not block:
-        raise InputError(str(sheet.path), "no runs", "at least one row below the header")
-    while block:
-        yield [row for row, _ in block], list(zip(*(found for _, found in block), strict=True))
-        block = list(itertools.islice(cells, _BLOCK))
-
-
-def run_cells(sheet: Sheet) -> tuple[pd.DataFrame, list[int]]:
-    """A table of runs as text, with the file row of each.
-
-    Raises
-    ------
-    InputError
-        When there is no row.
-    """
-    blocks = list(run_blocks(sheet))
-    tables = [pd.DataFrame(dict(enumerate(columns)), dtype=str) for _, columns in blocks]
-    table = pd.concat(tables, ignore_index=True).set_axis(sheet.header, axis=1)
-    return table, [row for rows, _ in blocks for row in rows]
