@@ -51,13 +51,14 @@ class Block:
 class _Problem:
     """Unknowns and equations of the candidate runs of a campaign."""
 
-    def __init__(self, campaign: Campaign, found: Identification, target: float) -> None:
+    def __init__(self, campaign: Campaign, identified: Identification, target: float) -> None:
         self.campaign, self.target = campaign, target
         solver = Solver(campaign)
-        solver.nodes, solver.values, solver.covariance = list(found.nodes), found.values, found.covariance
-        solver.index = {(n.name, n.part, n.point): i for i, n in enumerate(found.nodes)}
+        solver.nodes, solver.values = list(identified.nodes), identified.values
+        solver.covariance = identified.covariance
+        solver.index = {(n.name, n.part, n.point): i for i, n in enumerate(identified.nodes)}
         self.solver = solver
-        self.stderr = {k: math.sqrt(max(found.covariance[i, i], 0.0)) for k, i in solver.index.items()}
+        self.stderr = {k: math.sqrt(max(identified.covariance[i, i], 0.0)) for k, i in solver.index.items()}
         self.sizes = self._sizes()
         self._known_sizes: dict[tuple[str, str], float] = {}
         self.columns: dict[Place, int] = {}
@@ -116,7 +117,7 @@ class _Problem:
 
     def block(self, run: pd.Series) -> Block:
         """Equations of a candidate; unknowns are entered as they come."""
-        solver, found = self.solver, Block()
+        solver, block = self.solver, Block()
         features = solver.features(run)
         for output in OUTPUTS:
             row: dict[int, float] = {}
@@ -139,12 +140,12 @@ class _Problem:
                     now = self.stderr.get(place, math.nan) / size
                     self.needs[place] = Need(*place, why, size, term.tests, now)
                 if why:
-                    found.measured[place[0]] = None
+                    block.measured[place[0]] = None
             if expected:
                 sigma = self.noise.of(run, output, expected)
-                found.rows.append({c: v / sigma for c, v in row.items()})
-                found.sigma[output] = sigma
-        return found
+                block.rows.append({c: v / sigma for c, v in row.items()})
+                block.sigma[output] = sigma
+        return block
 
     def _subtracted(self, row: dict[int, float], term: Term, part: str, m: float, features: dict[str, float]) -> None:
         """Values that ``identify`` would subtract: their error limits what a run can tell."""

@@ -252,9 +252,9 @@ def usual(pieces: Iterator[Array], names: list[str], missing: Sequence[Sequence[
         for channel, values in zip(learning, piece.T, strict=True):
             if values.size:
                 channel.feed(values)
-    found = Usual(names)
+    learned = Usual(names)
     if learning and learning[0].count:
-        found._channels = [one.result(n, list(m)) for one, n, m in zip(learning, names, missing, strict=True)]
+        learned._channels = [one.result(n, list(m)) for one, n, m in zip(learning, names, missing, strict=True)]
     else:
-        found._channels = [_Channel() for _ in names]
-    return found
+        learned._channels = [_Channel() for _ in names]
+    return learned

@@ -272,7 +272,7 @@ def own_terms(path: str, term_set: str, changed: int = 0) -> tuple[Term, ...]:
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise InputError(path, f"cannot be read: {error}", "a CSV file of terms in UTF-8") from error
     known = (*OWN_COLUMNS, *_OWN_DEFAULTS)
-    found: list[Term] = []
+    terms_of_file: list[Term] = []
     taken = {t.name for t in terms(term_set)}
     for number, row in enumerate(rows, start=2):
         place = f"{path}, row {number}"
@@ -293,10 +293,10 @@ def own_terms(path: str, term_set: str, changed: int = 0) -> tuple[Term, ...]:
             text = "factors, axes and parities as in data/terms.csv, joined by *"
             raise InputError(place, str(error), text) from error
         taken.add(made.name)
-        found.append(made)
-    if not found:
+        terms_of_file.append(made)
+    if not terms_of_file:
         raise InputError(path, "no row", "at least one term")
-    return tuple(found)
+    return tuple(terms_of_file)
 
 
 @cache

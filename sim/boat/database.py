@@ -227,7 +227,7 @@ def check_digests(log: Log, number: int, everything: pd.DataFrame, vehicle: str 
     """
     expected, complete = log.contents(number)
     where = f"{log.path}, version {number}"
-    found: dict[str, str] = {}
+    digests: dict[str, str] = {}
     for name in vehicles_of(log, number, everything) if vehicle is None else [vehicle]:
         # A commit of early releases does not name its vehicle.
         wanted = expected.get(name, expected.get("", ""))
@@ -237,8 +237,8 @@ def check_digests(log: Log, number: int, everything: pd.DataFrame, vehicle: str 
         if not matches(log, number, everything[everything["vehicle"] == name], wanted):
             text = f"rows of {name!r} are not those that were committed (digest {wanted[:16]})"
             raise InputError(where, text, WHOLE)
-        found[name] = wanted
-    return found
+        digests[name] = wanted
+    return digests
 
 
 def stored_rows(log: Log, number: int) -> pd.DataFrame:

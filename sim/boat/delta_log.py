@@ -219,11 +219,11 @@ class Log:
         Vehicle -> digest of its rows (under "" of a commit that names no vehicle), and whether
         the entries that say so are all there.
         """
-        found: dict[str, str] = {}
+        digests: dict[str, str] = {}
         for k in range(number, self.first - 1, -1):
             entry = self.entry(k)
             if entry.version.digest:
-                found.setdefault(entry.version.metadata.get("vehicle", ""), entry.version.digest)
+                digests.setdefault(entry.version.metadata.get("vehicle", ""), entry.version.digest)
             if entry.beside is not None:
-                return entry.beside | found, True
-        return found, self.first == 0
+                return entry.beside | digests, True
+        return digests, self.first == 0

@@ -38,11 +38,11 @@ def _texts(column: pd.Series[Any]) -> list[str]:
     values = column.to_numpy()
     if values.dtype.kind in "fi":
         # Most cells of an axis are empty.
-        found = [""] * len(values)
+        texts = [""] * len(values)
         present = np.flatnonzero(values == values)
         for i, x in zip(present.tolist(), values[present].tolist(), strict=True):
-            found[i] = repr(x)
-        return found
+            texts[i] = repr(x)
+        return texts
     # Most texts of a column are alike, and some have many kilobytes.
     known: dict[str, str] = {}
     return [known[x] if x in known else known.setdefault(x, _text(x)) for x in values.tolist()]
@@ -74,12 +74,12 @@ def correlation_texts(covariance: Array, names: Iterable[int] | None = None) -> 
     scale = np.outer(stderr, stderr)
     matrix = np.divide(covariance, scale, out=np.zeros_like(covariance), where=scale > 0.0)
     np.fill_diagonal(matrix, 0.0)
-    found: dict[int, list[str]] = {}
+    texts: dict[int, list[str]] = {}
     row, column = np.nonzero(np.abs(matrix) > _LEAST_CORRELATION)
     # Plain numbers: a version has some hundred thousand pairs.
     for i, j, x in zip(row.tolist(), column.tolist(), matrix[row, column].tolist(), strict=True):
-        found.setdefault(number[i], []).append(f"{number[j]}:{x:.6g}")
-    return {i: " ".join(items) for i, items in found.items()}
+        texts.setdefault(number[i], []).append(f"{number[j]}:{x:.6g}")
+    return {i: " ".join(items) for i, items in texts.items()}
 
 
 def correlation_pairs(text: str) -> dict[int, float]:

@@ -208,17 +208,17 @@ def _ship_kinds(coefficients: Coefficients) -> tuple[bool, int]:
     """
     vehicle, there = coefficients.vehicle, {c.term.name for c in coefficients}
     names = [p.name for p in vehicle.planes]
-    found = {}
+    kinds = {}
     for group in ("ship propeller", "ship rudder", "propeller interaction"):
         wanted = [t.name for t in terms(vehicle.term_set) if t.group == group and not t.output]
         missing = [n for n in wanted if n not in there]
-        found[group] = bool(wanted) and not missing
+        kinds[group] = bool(wanted) and not missing
         if missing and len(missing) < len(wanted):
             text = f"all of the group {group}: without {', '.join(missing)} its loads are not known"
             raise InputError(f"vehicle {vehicle.name}", ", ".join(n for n in wanted if n in there), text)
-    if not found["ship rudder"]:
-        return found["ship propeller"], -1
-    if not found["ship propeller"] or vehicle.rudder is None or "rudder" not in names:
+    if not kinds["ship rudder"]:
+        return kinds["ship propeller"], -1
+    if not kinds["ship propeller"] or vehicle.rudder is None or "rudder" not in names:
         text = "a propeller, the table [rudder] and a plane of that name: its flow depends on them"
         raise InputError(f"vehicle {vehicle.name}", "coefficients of a rudder alone", text)
     return True, names.index("rudder")
