@@ -34,10 +34,10 @@ def turned_by(motion: str, angle: Array) -> Array:
     """Matrices (n, 3, 3) from axes at rest to those of a body turned by an angle about one of them."""
     c, s = np.cos(angle), np.sin(angle)
     a, b = [(1, 2), (2, 0), (0, 1)][_ABOUT[motion]]
-    found = np.zeros((angle.size, 3, 3))
-    found[:, [0, 1, 2], [0, 1, 2]] = 1.0
-    found[:, a, a], found[:, a, b], found[:, b, a], found[:, b, b] = c, s, -s, c
-    return found
+    turns = np.zeros((angle.size, 3, 3))
+    turns[:, [0, 1, 2], [0, 1, 2]] = 1.0
+    turns[:, a, a], turns[:, a, b], turns[:, b, a], turns[:, b, b] = c, s, -s, c
+    return turns
 
 
 def to_body(runs: pd.DataFrame, chosen: pd.Series, flow: pd.Series) -> pd.DataFrame:

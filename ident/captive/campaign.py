@@ -35,7 +35,7 @@ from ident.captive.histories import Reduced
 from ident.captive.other_loads import tare_applies, without_hydrostatics, without_inertia, without_tare
 from ident.captive.readers.opening import inputs
 from ident.captive.run_table import DIRECT, MEASURED, NUMBERS, run_table, sigma
-from ident.captive.runs import Found, source_runs
+from ident.captive.runs import Gathered, source_runs
 from ident.captive.source import Source
 from ident.cluster import Spread, here
 from ident.output import Tell, html_table, silent
@@ -117,11 +117,11 @@ def _sources(folder: Path, header: CampaignFile, vehicle: Vehicle, none_yet: boo
     every = sorted(p for p in folder.glob("[!.]*") if p.name not in beside)
     # RUNS.CSV is a table as well: some systems write names in capitals.
     names = [[p.name for p in every if p.suffix.lower() == kind] for kind in (".csv", ".parquet")]
-    found = [Source(files=glob.escape(name)) for kind in names for name in kind]
-    if not found and not none_yet and vehicle.geometry is None:
+    sources = [Source(files=glob.escape(name)) for kind in names for name in kind]
+    if not sources and not none_yet and vehicle.geometry is None:
         allowed = "one CSV a test beside campaign.toml, or [[source]]; without runs, a vehicle with a geometry file"
         raise InputError(str(folder), "no CSV file of runs", allowed)
-    return found
+    return sources
 
 
 def _check_words(folder: Path, runs: pd.DataFrame, allowed: dict[str, list[str]]) -> None:
@@ -140,7 +140,7 @@ def read_runs(
     tell: Tell = silent,
     spread: Spread = here,
     none_yet: bool = False,
-) -> tuple[pd.DataFrame, Found]:
+) -> tuple[pd.DataFrame, Gathered]:
     """The checked runs of every source, in SI and radians but still in the campaign's frame.
 
     Parameters
@@ -154,24 +154,24 @@ def read_runs(
     Returns
     -------
     runs : Those that could be read, in one table.
-    found : The histories that were reduced or refused, and the files that were read.
+    gathered : The histories that were reduced or refused, and the files that were read.
 
     Raises
     ------
     InputError
         Naming file, row, column, what was found and what is allowed.
     """
-    found = Found()
+    gathered = Gathered()
     words = {"test": list(tests().index), "part": vehicle.part_names(), "quality": list(header.quality)}
     for source in _sources(folder, header, vehicle, none_yet):
-        for table in source_runs(folder, source, header, found, tell, spread):
+        for table in source_runs(folder, source, header, gathered, tell, spread):
             _check_words(folder, table, {**words, "decoupled": ["", "True", "False"]})
             _check_complete(folder, table, vehicle)
-    runs = pd.concat(found.tables, ignore_index=True) if found.tables else pd.DataFrame()
+    runs = pd.concat(gathered.tables, ignore_index=True) if gathered.tables else pd.DataFrame()
     for column in NUMBERS:
         if column not in runs:
             runs[column] = np.nan
-    return runs, found
+    return runs, gathered
 
 
 def _refuse(refused: list[NotRising]) -> None:
@@ -188,18 +188,18 @@ def _refuse(refused: list[NotRising]) -> None:
 def _doubtful(runs: pd.DataFrame) -> pd.Series:
     """True for runs that may lack something: where ``_check_complete`` has to look."""
     blank = runs.reindex(columns=[*NUMBERS, *(sigma(o) for o in MEASURED)]).isna()
-    found = (runs["run_id"] == "") | blank[list(MEASURED)].all(axis=1)
+    doubtful = (runs["run_id"] == "") | blank[list(MEASURED)].all(axis=1)
     if "U" in runs:
-        found |= runs["U"] < 0
+        doubtful |= runs["U"] < 0
     for test in runs["test"].unique():
         for need in str(tests().loc[test, "requires"]).split():
             quantity = "plane" if need == "delta" else need
-            found |= (runs["test"] == test) & (runs[quantity].isna() if quantity in runs else True)
+            doubtful |= (runs["test"] == test) & (runs[quantity].isna() if quantity in runs else True)
     known = {text: set(text.split()) <= set(MEASURED) for text in runs["exclude"].unique()}
-    found |= ~runs["exclude"].map(known).astype(bool)
+    doubtful |= ~runs["exclude"].map(known).astype(bool)
     for output in MEASURED:
-        found |= blank["rel_sigma"] & ~blank[output] & blank[sigma(output)]
-    return found
+        doubtful |= blank["rel_sigma"] & ~blank[output] & blank[sigma(output)]
+    return doubtful
 
 
 def _check_complete(folder: Path, runs: pd.DataFrame, vehicle: Vehicle) -> None:
@@ -273,16 +273,16 @@ def read_campaign(
     vehicle = load_vehicle(header.vehicle, beside=folder / "campaign.toml")
     frame = header.frame.declared(f"{where}, [frame]")
     _check_named(header, vehicle, where)
-    runs, found = read_runs(folder, header, vehicle, tell, spread, none_yet)
+    runs, gathered = read_runs(folder, header, vehicle, tell, spread, none_yet)
     if not leave_out:
-        _refuse(found.refused)
+        _refuse(gathered.refused)
     digests = {"campaign.toml": hashlib.sha256(raw).hexdigest()}
-    for path in sorted({f for p in found.inputs for f in inputs(p)}):
+    for path in sorted({f for p in gathered.inputs for f in inputs(p)}):
         # Another process may have read it.
         note(path)
         digests[path.relative_to(folder).as_posix()] = _digest(path)
-    histories = (tuple(found.reduced), tuple(found.refused))
-    if runs.empty and header.source and not (none_yet or found.refused):
+    histories = (tuple(gathered.reduced), tuple(gathered.refused))
+    if runs.empty and header.source and not (none_yet or gathered.refused):
         text = "runs that are back; ident runs shows how far a matrix of cases is"
         raise InputError(where, "no file of any [[source]], all of them awaited", text)
     if runs.empty:
@@ -321,12 +321,12 @@ def _check_named(header: CampaignFile, vehicle: Vehicle, where: str) -> None:
 def _check_used(header: CampaignFile, runs: pd.DataFrame, where: str) -> None:
     """Every tare, inertia and hydrostatic load has a run that it is taken off."""
     for k, tare in enumerate(header.tare):
-        own = runs[tare_applies(runs, tare)]
+        taken_off = runs[tare_applies(runs, tare)]
         for key in ("loads", "per_speed_squared"):
             for output in getattr(tare, key):
-                if own[output].isna().all():
-                    found = f"no run it applies to measures {output}"
-                    raise InputError(f"{where}, key tare.{k}.{key}", found, "tests, parts and components of the runs")
+                if taken_off[output].isna().all():
+                    idle = f"no run it applies to measures {output}"
+                    raise InputError(f"{where}, key tare.{k}.{key}", idle, "tests, parts and components of the runs")
         if not (tare.loads or tare.per_speed_squared):
             raise InputError(f"{where}, key tare.{k}", "no load", "loads or per_speed_squared: nothing is taken off")
     tables = [("inertia", header.inertia.parts)] if header.inertia.model_inertia_in_loads else []
@@ -380,9 +380,9 @@ def _originals(folder: Path, runs: pd.DataFrame) -> pd.Series:
             at = parent[at]
 
     places = zip(copies["run_id"], copies["file"], copies["row"], strict=True)
-    found = runs["copy_of"].copy()
-    found[copies.index] = [origin(name, f"{folder / file}, row {row}") for name, file, row in places]
-    return found
+    originals = runs["copy_of"].copy()
+    originals[copies.index] = [origin(name, f"{folder / file}, row {row}") for name, file, row in places]
+    return originals
 
 
 def find_campaigns(folder: Path) -> list[Path]:
@@ -397,7 +397,7 @@ def find_campaigns(folder: Path) -> list[Path]:
         raise InputError(str(folder), "not a folder", "a folder with campaign.toml, or one that holds such folders")
     if (folder / "campaign.toml").is_file():
         return [folder]
-    found = sorted(p.parent for p in folder.glob("*/campaign.toml"))
-    if not found:
+    folders = sorted(p.parent for p in folder.glob("*/campaign.toml"))
+    if not folders:
         raise InputError(str(folder), "no campaign.toml here or one level below", "a campaign folder")
-    return found
+    return folders

@@ -63,18 +63,18 @@ def read_cells(sheet: Sheet, wanted: list[tuple[int, Column | None]], source: So
     InputError
         Naming file, row and column of a cell that cannot be read.
     """
-    found: list[list[np.ndarray]] = [[] for _ in wanted]
+    by_column: list[list[np.ndarray]] = [[] for _ in wanted]
     places = []
     beside = _Beside(source)
     for rows, cells in run_blocks(sheet):
-        for parts, (at, kind) in zip(found, wanted, strict=True):
+        for parts, (at, kind) in zip(by_column, wanted, strict=True):
             parts.append(_words(cells[at]) if kind is None else _numbers(sheet, cells[at], rows, kind, beside))
         places.append(np.array(rows))
     every = np.concatenate(places)
     errors = {name: np.array([by.get(int(row), np.nan) for row in every]) for name, by in beside.errors.items()}
     notes = ["; ".join(beside.notes.get(int(row), ())) for row in every]
     marks = [beside.marks.get(int(row), "") for row in every]
-    return Cells([np.concatenate(parts) for parts in found], every, errors, notes, marks, beside.used)
+    return Cells([np.concatenate(parts) for parts in by_column], every, errors, notes, marks, beside.used)
 
 
 class _Beside:

@@ -68,11 +68,11 @@ def combined(campaigns: Sequence[Campaign], paths: Sequence[Path]) -> Campaign:
     digests: dict[str, str] = {}
     for name, path, one in zip(names, paths, campaigns, strict=True):
         _same_vehicle(first, one, path)
-        for word, own in one.header.quality.items():
-            if word in quality and quality[word].factor != own.factor:
-                found = f"{word!r} with factor {own.factor:g}, {quality[word].factor:g} in {paths[0]} or another"
-                raise InputError(f"{path / 'campaign.toml'}, key quality", found, "one factor a word, or another word")
-            quality.setdefault(word, own)
+        for word, stated in one.header.quality.items():
+            if word in quality and quality[word].factor != stated.factor:
+                wrong = f"{word!r} with factor {stated.factor:g}, {quality[word].factor:g} in {paths[0]} or another"
+                raise InputError(f"{path / 'campaign.toml'}, key quality", wrong, "one factor a word, or another word")
+            quality.setdefault(word, stated)
         tables.append(_table(one, name, first.header.fluid.density_kgpm3))
         digests |= {f"{name}/{file}": digest for file, digest in one.digests.items()}
     header = first.header.model_copy(
@@ -105,9 +105,9 @@ def _same_vehicle(first: Campaign, one: Campaign, path: Path) -> None:
     mine, other = first.vehicle.model_dump(), one.vehicle.model_dump()
     different = sorted(k for k in mine if mine[k] != other[k] and k not in ("source", "title", "geometry"))
     if different:
-        found = f"vehicle {one.vehicle.name!r} with another {different[0]} than {first.header.name}'s"
+        wrong = f"vehicle {one.vehicle.name!r} with another {different[0]} than {first.header.name}'s"
         text = "one vehicle file for all campaigns of a boat: scale and moment point of a campaign are its own"
-        raise InputError(f"{path / 'campaign.toml'}, key vehicle", found, text)
+        raise InputError(f"{path / 'campaign.toml'}, key vehicle", wrong, text)
 
 
 def _table(one: Campaign, name: str, density: float) -> pd.DataFrame:

@@ -73,11 +73,11 @@ def arm_rates(runs: pd.DataFrame, where: str) -> pd.DataFrame:
     off = given & turning.notna() & ((turning - rate.abs()).abs() > _SAME_RADIUS * rate.abs())
     if off.any():
         run = runs[off].iloc[0]
-        found = f"{run['R0']:g}, with which the rate is {rate[off].iloc[0]:g} rad/s and not {turning[off].iloc[0]:g}"
+        wrong = f"{run['R0']:g}, with which the rate is {rate[off].iloc[0]:g} rad/s and not {turning[off].iloc[0]:g}"
         place = f"{where}/{run['file']}, row {run['row']}, column R0"
-        raise InputError(place, found, "a radius that fits speed and rate, or one of the two")
-    own = runs["r"] if "r" in runs else pd.Series(np.nan, index=runs.index)
-    out["r"] = own.where(turning.notna() | ~given, rate)
+        raise InputError(place, wrong, "a radius that fits speed and rate, or one of the two")
+    measured = runs["r"] if "r" in runs else pd.Series(np.nan, index=runs.index)
+    out["r"] = measured.where(turning.notna() | ~given, rate)
     return out
 
 
@@ -89,12 +89,12 @@ def deflected_left_out(runs: pd.DataFrame, vehicle: Vehicle) -> pd.DataFrame:
     """
     planes = [p.name for p in vehicle.planes]
     turned = runs["plane"].fillna(0.0).abs() > _AMIDSHIPS
-    own = turned & ~runs["part"].isin(planes)
-    if not own.any():
+    deflected = turned & ~runs["part"].isin(planes)
+    if not deflected.any():
         return runs
     out = runs.copy()
     loads = [o for o in (*OUTPUTS, *DIRECT) if o in runs]
-    for i, run in runs[own].iterrows():
+    for i, run in runs[deflected].iterrows():
         angle = math.degrees(run["plane"])
         reason = f"a plane at {angle:g} deg: a run of the {run['part']} has them amidships"
         out.loc[i, "exclude"] = " ".join(o for o in loads if pd.notna(run[o]))

@@ -74,8 +74,8 @@ def dimensional(runs: pd.DataFrame, primed: set[str], source: Source, header: Ca
         return runs
     table, name = normalisations(), source.normalisation
     if name not in table.index:
-        found = repr(name) if name else f"{', '.join(sorted(primed))} dimensionless, and no normalisation"
-        raise InputError(f"{where}, key source.normalisation", found, ", ".join(table.index))
+        wrong = repr(name) if name else f"{', '.join(sorted(primed))} dimensionless, and no normalisation"
+        raise InputError(f"{where}, key source.normalisation", wrong, ", ".join(table.index))
     forms = table.loc[name]
     if header.scale.draught_m is None and "d" in f"{forms['force']} {forms['moment']}".split():
         raise InputError(f"{where}, key scale.draught_m", "nothing", f"the draught: {name} needs it")

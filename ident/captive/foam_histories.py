@@ -25,28 +25,28 @@ def foam_channels(
     if not path.is_dir():
         raise InputError(str(path), "a file", "a case folder, its postProcessing, or one function object in it")
     try:
-        found = openfoam.objects(path)
+        by_name = openfoam.objects(path)
     except OSError as error:
         raise InputError(str(path), f"cannot be read: {error.strerror}", "a readable folder") from error
-    if not found:
+    if not by_name:
         others = sorted({p.name for p in path.glob("**/*.dat")})[:5]
         seen = f", only {', '.join(others)}" if others else ""
         text = "postProcessing/<function object>/<start>/forces.dat or force.dat; coefficients are not read"
         raise InputError(str(path), f"no output of forces{seen}", text)
     for name in source.parts:
-        if name not in found:
-            raise InputError(str(path), f"no function object {name!r}", ", ".join(found))
+        if name not in by_name:
+            raise InputError(str(path), f"no function object {name!r}", ", ".join(by_name))
     twice = [part for part in source.parts.values() if list(source.parts.values()).count(part) > 1]
     if twice:
         text = "one function object a part: it sums the patches that it is given"
         raise InputError(f"{where}, key source.parts", f"{twice[0]!r} twice", text)
-    chosen = source.parts or (dict.fromkeys(found, "") if len(found) == 1 else {})
+    chosen = source.parts or (dict.fromkeys(by_name, "") if len(by_name) == 1 else {})
     if not chosen:
-        text = f"[source.parts] naming the part of each: {', '.join(found)}"
-        raise InputError(str(path), f"{len(found)} function objects", text)
+        text = f"[source.parts] naming the part of each: {', '.join(by_name)}"
+        raise InputError(str(path), f"{len(by_name)} function objects", text)
     for name, part in chosen.items():
-        pieces = _pieces(found[name], source, header, where)
-        moving = _moving(found[name], source, header, numbers, where)
+        pieces = _pieces(by_name[name], source, header, where)
+        moving = _moving(by_name[name], source, header, numbers, where)
         yield part, Channels(path, ["time", *openfoam.LOADS], pieces, moving=moving)
 
 

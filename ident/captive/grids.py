@@ -72,21 +72,21 @@ def convergence(fine: float, medium: float, coarse: float, refinement: float) ->
     >>> found.kind, round(found.order, 6), round(found.uncertainty, 6)
     ('monotonic', 2.0, 0.0125)
     """
-    own = rules()
+    rule = rules()
     e21, e32 = medium - fine, coarse - medium
     spread = max(fine, medium, coarse) - min(fine, medium, coarse)
     if e21 == 0.0:
         # Two grids agree to the last digit: what is left is the step to the third, had it gone on.
-        return Convergence("monotonic", own["order"], own["safety"] * abs(e32) / (refinement ** own["order"] - 1.0))
+        return Convergence("monotonic", rule["order"], rule["safety"] * abs(e32) / (refinement ** rule["order"] - 1.0))
     ratio = e21 / e32 if e32 != 0.0 else math.inf
     if 0.0 < ratio < 1.0:
         observed = math.log(1.0 / ratio) / math.log(refinement)
-        if observed >= own["least_order"]:
-            order = min(observed, own["order"])
-            return Convergence("monotonic", order, own["safety"] * abs(e21) / (refinement**order - 1.0))
+        if observed >= rule["least_order"]:
+            order = min(observed, rule["order"])
+            return Convergence("monotonic", order, rule["safety"] * abs(e21) / (refinement**order - 1.0))
     if -1.0 < ratio < 0.0:
         return Convergence("oscillatory", math.nan, 0.5 * spread)
-    return Convergence("none", math.nan, own["safety_doubtful"] * spread)
+    return Convergence("none", math.nan, rule["safety_doubtful"] * spread)
 
 
 def with_discretisation(
@@ -114,11 +114,12 @@ def with_discretisation(
     for output in (o for o in OUTPUTS if o in out):
         errors = []
         for i, (a, b, c) in enumerate(zip(out[output], medium[output], coarse[output], strict=True)):
-            found = convergence(float(a), float(b), float(c), refinement)
+            converged = convergence(float(a), float(b), float(c), refinement)
             statistical = float(out[f"s_{output}"].iloc[i]) if f"s_{output}" in out else 0.0
-            errors.append(math.hypot(statistical, found.stderr))
-            order = f" of order {found.order:.2g}" if found.kind == "monotonic" else ""
-            told[i].append(f"{output} {found.kind}{order} +- {found.stderr:.3g}")
+            errors.append(math.hypot(statistical, converged.stderr))
+            order = f" of order {converged.order:.2g}" if converged.kind == "monotonic" else ""
+            told[i].append(f"{output} {converged.kind}{order} +- {converged.stderr:.3g}")
         out[f"s_{output}"] = errors
-    out["reduction"] = [f"{text}; grids: {', '.join(own)}" for text, own in zip(out["reduction"], told, strict=True)]
+    both = zip(out["reduction"], told, strict=True)
+    out["reduction"] = [f"{text}; grids: {', '.join(of_run)}" for text, of_run in both]
     return out

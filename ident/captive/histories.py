@@ -133,9 +133,9 @@ def reduce(channels: Channels, rule: Reduction, run_id: str, frequency: float | 
         window = f" between start_s and end_s ({rule.start_s}, {rule.end_s})" if rule.start_s or rule.end_s else ""
         text = f"samples enough for a {rule.kind} fit{window}"
         raise InputError(str(channels.path), f"{error} in {condensed.samples} rows", text) from error
-    own = (clock, rule.rate_hz, channels.first_row)
+    times = (clock, rule.rate_hz, channels.first_row)
     reduced = replace(
-        Reduced(run_id, channels.path.name, names, rule.kind, fit, *own),
+        Reduced(run_id, channels.path.name, names, rule.kind, fit, *times),
         left_out=dict(faults.counts),
         clipped=faults.clipped,
         samples=condensed.samples + sum(faults.counts.values()),
@@ -143,11 +143,11 @@ def reduce(channels: Channels, rule: Reduction, run_id: str, frequency: float | 
         line=line,
     )
     if rule.kind == "oscillatory":
-        found, delays = _harmonic_values(names, fit, frequency or 0.0, rule)
+        harmonics, delays = _harmonic_values(names, fit, frequency or 0.0, rule)
         whole = condense.condense(_moved(sound(None), channels, names, rule, frequency), condense.constant, len(names))
         weight, time, _, samples = whole.blocks()
         seen = delay.of_loads(time, samples, weight, names, frequency or 0.0, rule.delay_s)
-        return found, replace(reduced, delays=(*delays, *((seen,) if seen else ())))
+        return harmonics, replace(reduced, delays=(*delays, *((seen,) if seen else ())))
     values: dict[str, Any] = {}
     for c, name in enumerate(names):
         values[name] = float(fit.values[0, c])
@@ -161,8 +161,8 @@ def reduce(channels: Channels, rule: Reduction, run_id: str, frequency: float | 
 def _sound(channels: Channels, rule: Reduction, names: list[str]) -> tuple[Callable[[Clock | None], Timed], Usual]:
     """The history with the samples marked that are no measurements, and what its channels are like."""
     missing = [channels.missing.get(name, ()) for name in names]
-    found = usual((values for _, values in timed(channels, rule)), names, missing)
-    return (lambda clock: found.faults(timed(channels, rule, clock))), found
+    learned = usual((values for _, values in timed(channels, rule)), names, missing)
+    return (lambda clock: learned.faults(timed(channels, rule, clock))), learned
 
 
 def _moved(pieces: Timed, channels: Channels, names: list[str], rule: Reduction, frequency: float | None) -> Timed:
@@ -219,15 +219,15 @@ def _harmonic_values(
             a = k * (shift - late)
             block = [[math.cos(a), math.sin(a)], [-math.sin(a), math.cos(a)]]
             turn[2 * k - 1 : 2 * k + 1, 2 * k - 1 : 2 * k + 1] = block
-        own = turn @ fit.values[:, c_]
+        turned = turn @ fit.values[:, c_]
         if name.removeprefix(TAKEN) in OUTPUTS:
-            values |= {f"{name}_{h}": float(v) for h, v in zip(HARMONICS, own, strict=True)}
+            values |= {f"{name}_{h}": float(v) for h, v in zip(HARMONICS, turned, strict=True)}
             covariance[name] = turn @ fit.covariance[c_] @ turn.T
         elif name in MOTIONS[motion]:
             # A measured rate or acceleration swings with the motion: its amplitude is meant, not its mean.
-            seen = delay.of_rate(name, motion, own, turn @ fit.covariance[c_] @ turn.T, frequency)
+            seen = delay.of_rate(name, motion, turned, turn @ fit.covariance[c_] @ turn.T, frequency)
             delays += [seen] if seen else []
-            values[name] = math.hypot(own[1], own[2]) * (1.0 if name == MOTIONS[motion][0] else -1.0)
+            values[name] = math.hypot(turned[1], turned[2]) * (1.0 if name == MOTIONS[motion][0] else -1.0)
         elif name != "displacement":
-            values[name] = float(own[0])
+            values[name] = float(turned[0])
     return values | {"covariance": covariance, "frequency": frequency}, delays

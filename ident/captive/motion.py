@@ -34,8 +34,8 @@ def line_of(pieces: Timed, names: list[str], frequency: float | None, channels: 
     )
     if frequency is None and "displacement" not in names:
         raise InputError(str(channels.path), "no frequency", "frequency_hz in [source.reduction], or frequency")
-    found = estimate(time, values[:, chosen], weight, frequency) if time.size else None
-    return None if found is None else replace(found, channel=chosen[found.channel])
+    line = estimate(time, values[:, chosen], weight, frequency) if time.size else None
+    return None if line is None else replace(line, channel=chosen[line.channel])
 
 
 def frequency_of(
@@ -51,8 +51,8 @@ def frequency_of(
         return stated, None
     off = abs(line.frequency - stated)
     if off > _OFF * stated:
-        found = f"frequency_hz = {stated:g}, and {names[line.channel]} oscillates at {line.frequency:.5g} Hz"
-        raise InputError(str(channels.path), found, f"the frequency of the motion, to {100 * _OFF:g} %")
+        wrong = f"frequency_hz = {stated:g}, and {names[line.channel]} oscillates at {line.frequency:.5g} Hz"
+        raise InputError(str(channels.path), wrong, f"the frequency of the motion, to {100 * _OFF:g} %")
     drift = off * span_of(channels, rule)
     return (line.frequency, stated) if off > _SURE * line.stderr and drift > _DRIFT else (stated, None)
 

@@ -118,8 +118,8 @@ def moving_body(
     turns = rule.motion not in _ALONG
     stands = axes == "tank" and (alpha != 0.0 or beta != 0.0)
     if axes == "tank" and turns and {"yaw": alpha, "pitch": beta, "roll": abs(alpha) + abs(beta)}[rule.motion]:
-        found = f"axes of the tank, {rule.motion} and angles out of its plane"
-        raise InputError(f"{where}, key axes", found, "loads along the body's axes")
+        wrong = f"axes of the tank, {rule.motion} and angles out of its plane"
+        raise InputError(f"{where}, key axes", wrong, "loads along the body's axes")
     swings = turns and axes == "tank"
     point = np.array(frame.vector([header.moment_point.x_m, header.moment_point.y_m, header.moment_point.z_m]))
     carried = moments_about == "fixed" and (not turns or bool(point.any()))

@@ -66,7 +66,7 @@ def states(run: dict[str, Any], rule: Reduction, frame: Frame, ittc: bool, where
     if not omega > 0.0:
         raise InputError(f"{where}, column frequency", "nothing", "a frequency, or frequency_hz in [source.reduction]")
     speed, given = _amplitudes(run, rule, omega, where)
-    found = []
+    made = []
     for name, theta in PHASES.items():
         state = {k: v for k, v in run.items() if "_" not in k or k.split("_")[-1] not in HARMONICS}
         state["run_id"] = f"{run['run_id']}{name}"
@@ -86,8 +86,8 @@ def states(run: dict[str, Any], rule: Reduction, frame: Frame, ittc: bool, where
                 state[f"s_{output}"] = math.sqrt(max(variance, 0.0))
         for name_ in ("covariance", "frequency", "amplitude", "displacement"):
             state.pop(name_, None)
-        found.append(state)
-    return found
+        made.append(state)
+    return made
 
 
 def _amplitudes(run: dict[str, Any], rule: Reduction, omega: float, where: str) -> tuple[float, float]:
@@ -107,9 +107,9 @@ def _amplitudes(run: dict[str, Any], rule: Reduction, omega: float, where: str) 
         raise InputError(f"{where}, column displacement", "nothing", text)
     off = abs(speed - known.get(speed_name, speed))
     if off > _AGREE * abs(speed):
-        found = f"amplitudes {speed_name} = {known[speed_name]:g} and {acceleration_name} = {-speed * omega:g}"
+        wrong = f"amplitudes {speed_name} = {known[speed_name]:g} and {acceleration_name} = {-speed * omega:g}"
         text = f"{acceleration_name} = -{speed_name} omega with omega = {omega:g} rad/s (displacement A sin)"
-        raise InputError(where, found, text)
+        raise InputError(where, wrong, text)
     return speed, -speed * omega
 
 

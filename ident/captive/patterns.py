@@ -39,14 +39,14 @@ def compiled(text: str) -> Any:
     options = re2.Options()
     options.log_errors = False
     try:
-        found = re2.compile(text, options)
+        expression = re2.compile(text, options)
     except (re2.error, UnicodeError) as error:
         said = error.args[0] if error.args else ""
         shown = said.decode("utf-8", "replace") if isinstance(said, bytes) else str(said)
         raise ValueError(f"a regular expression in {SYNTAX}; {shown}") from error
-    if found.programsize > _STEPS:
-        raise ValueError(f"a smaller regular expression: this one has {found.programsize} steps, {_STEPS} at most")
-    return found
+    if expression.programsize > _STEPS:
+        raise ValueError(f"a smaller regular expression: this one has {expression.programsize} steps, {_STEPS} at most")
+    return expression
 
 
 def search(text: str, line: str) -> Any:

@@ -89,8 +89,8 @@ def factor_of(run: pd.Series, term: Term, header: CampaignFile, vehicle: Vehicle
             return sign * angles[0] * over
         return sign * angles[0] * over * _from_norm(run, term, name, header, place)
     if name:
-        found = f"unit {unit!r}, and normalisation {name!r}"
-        raise InputError(f"{place}, column value", found, "one of the two: a dimensional value has no normalisation")
+        wrong = f"unit {unit!r}, and normalisation {name!r}"
+        raise InputError(f"{place}, column value", wrong, "one of the two: a dimensional value has no normalisation")
     return sign * angles[0] * _from_dimension(run, term, powers, unit, header, place) * over
 
 
@@ -98,11 +98,11 @@ def _unit(unit: str, place: str) -> tuple[tuple[float, float, float], tuple[floa
     """Powers of kg, m and s of a unit with its factor to SI and radians, and its power of an angle."""
     if unit in ("", "-", "1", "/"):
         return (0.0, 0.0, 0.0), (1.0, 0)
-    found = powers_of(unit)
-    if found is None:
+    powers = powers_of(unit)
+    if powers is None:
         text = "no unit for prime form, 1/deg, or the dimension of the coefficient, such as kg/m, N s/m or kg m/rad"
         raise InputError(place, f"unit {unit[:40]!r}", text)
-    factor, kilograms, metres, seconds, angle = found
+    factor, kilograms, metres, seconds, angle = powers
     return (kilograms, metres, seconds), (factor, -angle)
 
 
@@ -149,14 +149,14 @@ def _from_norm(run: pd.Series, term: Term, name: str, header: CampaignFile, plac
         return float(product(str(form[kind]), made).iloc[0]) if kind != "velocity" else float(one.iloc[0])
 
     kinds = {**PRIMED, "u": "velocity", "v": "velocity", "w": "velocity"}
-    found = size(PRIMED[term.output]) / scale.length_m**term.power
+    made_of = size(PRIMED[term.output]) / scale.length_m**term.power
     for factor in term.factors:
         if _bare(factor) in kinds:
-            found /= size(kinds[_bare(factor)])
-    if not math.isfinite(found):
+            made_of /= size(kinds[_bare(factor)])
+    if not math.isfinite(made_of):
         text = "the length that moments and rates were made dimensionless with"
         raise InputError("campaign.toml, key source.reference.length_m", "nothing", text)
-    return found
+    return made_of
 
 
 def _from_dimension(

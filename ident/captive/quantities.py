@@ -157,14 +157,14 @@ def owner(quantity: str) -> str:
 
 def split(header: str) -> tuple[str, str | None]:
     """A header as name and unit in brackets; the unit is None when there are no brackets."""
-    found = _BRACKET.match(header.strip())
-    if not found:
+    parts = _BRACKET.match(header.strip())
+    if not parts:
         after = _AFTER.match(header.strip())
         if after and is_unit(after["unit"].strip()):
             return after["name"].strip(), after["unit"].strip()
         return header.strip(), None
-    unit = found["square"] if found["square"] is not None else found["round"]
-    return found["name"].strip(), unit.strip()
+    unit = parts["square"] if parts["square"] is not None else parts["round"]
+    return parts["name"].strip(), unit.strip()
 
 
 def _clean(unit: str) -> str | None:
@@ -176,18 +176,18 @@ def _clean(unit: str) -> str | None:
     # A product in brackets divides as a whole: kg/(m rad) is kg/m/rad.
     text = re.sub(r"/\s*\(([^()]*)\)", lambda m: "/" + re.sub(r"(?<!\*)\*(?!\*)", "/", m[1].strip()), text)
     parts = [p.strip() for p in re.split(r"(?<!\*)\*(?!\*)|(/)", text) if p is not None]
-    found = []
+    cleaned = []
     for part in parts:
         if part == "/":
-            found.append(part)
+            cleaned.append(part)
             continue
         match = _PART.fullmatch(part.strip("()"))
         if part != "1" and not match:
             return None
-        found.append(part if not match else match[1] + (f"**{match[2]}" if match[2] else ""))
-    if len(found) > 8:
+        cleaned.append(part if not match else match[1] + (f"**{match[2]}" if match[2] else ""))
+    if len(cleaned) > 8:
         return None
-    return re.sub(r"\*?/\*?", "/", "*".join(found))
+    return re.sub(r"\*?/\*?", "/", "*".join(cleaned))
 
 
 @cache
@@ -203,12 +203,12 @@ def factor(quantity: str, unit: str) -> float | None:
     if unit in choices:
         return choices[unit]
     if (power := _POWER.fullmatch(unit)) is not None:
-        own = factor(quantity, power["unit"])
-        ten = (power["a"] or power["b"] or power["c"].translate(_RAISED)) if own is not None else ""
-        return None if own is None or not -9 <= int(ten) <= 9 else own * 10.0 ** int(ten)
+        base = factor(quantity, power["unit"])
+        ten = (power["a"] or power["b"] or power["c"].translate(_RAISED)) if base is not None else ""
+        return None if base is None or not -9 <= int(ten) <= 9 else base * 10.0 ** int(ten)
     spelled = _other_spellings().get(unit)
-    if spelled is not None and (own := factor(quantity, spelled)) is not None:
-        return own
+    if spelled is not None and (base := factor(quantity, spelled)) is not None:
+        return base
     if unit in _NO_UNIT or quantity not in _spelled() or len(unit) > 40:
         return choices.get("") if unit in _NO_UNIT else None
     text = _clean(unit)
@@ -248,8 +248,8 @@ def powers_of(unit: str) -> tuple[float, float, float, float, int] | None:
         made = registry.Quantity(1.0, given).to_base_units()
     except (pint.errors.PintError, ValueError, TypeError, AttributeError, ArithmeticError):
         return None
-    own = {str(u): float(p) for u, p in dict(given._units).items()}
-    angle = round(sum(p for u, p in own.items() if u in _ANGLES))
+    powers = {str(u): float(p) for u, p in dict(given._units).items()}
+    angle = round(sum(p for u, p in powers.items() if u in _ANGLES))
     base = {str(k): float(v) for k, v in dict(made.dimensionality).items()}
     known = {"[mass]", "[length]", "[time]"}
     if set(base) - known:

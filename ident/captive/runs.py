@@ -38,7 +38,7 @@ from sim.files.errors import InputError
 
 
 @dataclass
-class Found:
+class Gathered:
     """What some sources gave.
 
     Attributes
@@ -56,7 +56,7 @@ class Found:
 
 
 def source_runs(
-    folder: Path, source: Source, header: CampaignFile, found: Found, tell: Tell = silent, spread: Spread = here
+    folder: Path, source: Source, header: CampaignFile, gathered: Gathered, tell: Tell = silent, spread: Spread = here
 ) -> list[pd.DataFrame]:
     """Add all runs of one source to what was found.
 
@@ -65,7 +65,7 @@ def source_runs(
     folder : The campaign's.
     source : One ``[[source]]``.
     header : The campaign, for frame, scale and density.
-    found : Its lists grow.
+    gathered : Its lists grow.
     tell : Told of every file.
     spread : Reads the files, here or on a cluster that sees the same folder.
 
@@ -84,18 +84,18 @@ def source_runs(
     read = spread(_read, ((folder, path, source, header) for path in paths))
     for done in range(len(paths)):
         tell(f"reading {source.files}", done, len(paths))
-        table, reduced, refused, own = next(read)
-        uses.add(own)
-        found.reduced += reduced
+        table, reduced, refused, used = next(read)
+        uses.add(used)
+        gathered.reduced += reduced
         if refused is not None:
-            found.refused.append(refused)
+            gathered.refused.append(refused)
         else:
             tables.append(table)
-    if paths and not found.refused:
+    if paths and not gathered.refused:
         uses.refuse()
     tell(f"reading {source.files}", len(paths), len(paths))
-    found.tables += tables
-    found.inputs += [p for path in paths for p in (path, *on_coarser_grids(path, folder, source))]
+    gathered.tables += tables
+    gathered.inputs += [p for path in paths for p in (path, *on_coarser_grids(path, folder, source))]
     return tables
 
 
@@ -235,11 +235,11 @@ def _cartesian(table: pd.DataFrame, where: str) -> pd.DataFrame:
         if not given & {"amp", "phase", "lag"}:
             continue
         if given not in ({"amp", "phase"}, {"amp", "lag"}):
-            found = " ".join(sorted(names[kind] for kind in given))
+            wrong = " ".join(sorted(names[kind] for kind in given))
             text = (
                 f"{names['amp']} with one of {names['phase']} (ahead of the displacement) and {names['lag']} (behind)"
             )
-            raise InputError(f"{where}, key source.columns", found, text)
+            raise InputError(f"{where}, key source.columns", wrong, text)
         phase = out[names["phase"]] if "phase" in given else -out[names["lag"]]
         parts = {names["in"]: out[names["amp"]] * np.cos(phase), names["out"]: out[names["amp"]] * np.sin(phase)}
         out = out.drop(columns=[names[kind] for kind in given]).assign(**parts)
@@ -248,8 +248,8 @@ def _cartesian(table: pd.DataFrame, where: str) -> pd.DataFrame:
 
 def _of_values(source: Source) -> tuple[str, float, float]:
     """How published values of a source were made dimensionless: name, area and length [SI] where stated."""
-    own = source.reference
-    return source.normalisation, own.area_m2 if own else np.nan, (own.length_m or np.nan) if own else np.nan
+    stated = source.reference
+    return source.normalisation, stated.area_m2 if stated else np.nan, (stated.length_m or np.nan) if stated else np.nan
 
 
 def _required(sheet: Sheet, columns: set[str], source: Source) -> None:
@@ -288,20 +288,22 @@ def _from_histories(
     rows: list[dict[str, Any]] = []
     reduced = []
     for part, channels in _channels(path, source, header, numbers, where, uses):
-        own = dict(words) | ({"part": part} if part else {})
+        words_of_run = dict(words) | ({"part": part} if part else {})
         # Of a folder "drift_2.5" all is its name.
-        name = own.get("run_id") or (path.name if path.is_dir() else path.stem)
-        own["run_id"] = f"{name}-{part}" if part else name
+        name = words_of_run.get("run_id") or (path.name if path.is_dir() else path.stem)
+        words_of_run["run_id"] = f"{name}-{part}" if part else name
         if "frequency" in numbers and rule.frequency_hz is not None:
             raise InputError(f"{where}, key source.reduction.frequency_hz", "frequency stated twice", "one of the two")
         frequency = numbers.get("frequency", rule.frequency_hz)
         _no_idle_rule(channels, rule, where)
-        values, one = reduce(channels, rule, own["run_id"], frequency)
+        values, one = reduce(channels, rule, words_of_run["run_id"], frequency)
         for quantity in values:
             if quantity in numbers and quantity != "frequency":
                 found = f"{quantity} is measured and stands in [source.constants]"
                 raise InputError(str(channels.path), found, "one of the two")
-        run = {**dict.fromkeys((*TEXT, "notes"), ""), "source": f"{path.name}, reduced", **own, **numbers, **values}
+        run = (
+            dict.fromkeys((*TEXT, "notes"), "") | {"source": f"{path.name}, reduced"} | words_of_run | numbers | values
+        )
         run |= {"file": path.name, "row": 1, "reduction": one.words(), "converged": one.fit.converged}
         rows += states(run, rule, frame, ittc, str(path)) if rule.kind == "oscillatory" else [run]
         reduced.append(one)

@@ -342,5 +342,5 @@ class Source(Data):
 def idle_keys(source: Source, reader: str) -> list[str]:
     """Keys of a source that its reader does not look at."""
     some = {key for keys in LOOKED_AT.values() for key in keys}
-    own = {*LOOKED_AT[reader], *(("subtract",) if reader == "openfoam" else ())}
-    return sorted(k for k in source.model_fields_set if k in some and k not in own)
+    looked_at = {*LOOKED_AT[reader], *(("subtract",) if reader == "openfoam" else ())}
+    return sorted(k for k in source.model_fields_set if k in some and k not in looked_at)

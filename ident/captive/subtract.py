@@ -109,8 +109,8 @@ def _complete(
     if one.at_m is not None:
         return
     for end in sorted(ends):
-        own = sorted({m for q in given if q[1:] == end for m in _MOMENTS.get(q[0], "")})
-        lost = [f"{m}{end}" for m in own if f"{m}{end}" in totals - given]
+        moments = sorted({m for q in given if q[1:] == end for m in _MOMENTS.get(q[0], "")})
+        lost = [f"{m}{end}" for m in moments if f"{m}{end}" in totals - given]
         if lost:
             text = f"the point its forces act at, or columns for its moments about the moment point ({' '.join(lost)})"
             raise InputError(f"{place}.at_m", "nothing", text)
@@ -139,10 +139,10 @@ def off_table(
     """
     out = runs.copy()
     for i, one in enumerate(taken):
-        own = runs[["file", "row"]].assign(**({"U": runs["U"]} if "U" in runs else {}))
-        own[one.kind.quantity] = parts[i].to_numpy()
+        of_part = runs[["file", "row"]].assign(**({"U": runs["U"]} if "U" in runs else {}))
+        of_part[one.kind.quantity] = parts[i].to_numpy()
         primed = {one.kind.quantity} if one.kind.primed else set()
-        load = dimensional(own, primed, source, header, str(sheet.path))[one.kind.quantity]
+        load = dimensional(of_part, primed, source, header, str(sheet.path))[one.kind.quantity]
         for total, share in one.shares.items():
             bare = load.isna() & out[total].notna()
             if bare.any():

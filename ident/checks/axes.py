@@ -81,8 +81,8 @@ def thrust_in_x(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
     """X of hull runs with revolutions, from which no thrust was taken off."""
     runs = evidence.runs
     taken = runs["taken_X"].notna() if "taken_X" in runs else pd.Series(False, index=runs.index)
-    own = runs[(runs["part"].isin(_HULL)) & (runs["n"].fillna(0.0) != 0.0) & ~taken & kept(runs, "X")]
-    for file, group in own.groupby(together(own), sort=False):
+    pushed = runs[(runs["part"].isin(_HULL)) & (runs["n"].fillna(0.0) != 0.0) & ~taken & kept(runs, "X")]
+    for file, group in pushed.groupby(together(pushed), sort=False):
         what = f"X of {len(group)} hull runs with the propeller at {group['n'].min():g} to {group['n'].max():g} rev/s"
         yield rule.finding(str(file), rows_of(group), ["X", "n"], what)
 
@@ -100,10 +100,10 @@ def _groups(evidence: Evidence, test: str, angle: str) -> Iterator[tuple[str, pd
     swung = phases["phase"].notna()
     source = together(runs)
     for file, group in runs[steady].groupby(source[steady], sort=False):
-        own = group[~swung[group.index]]
-        if len(own):
-            yield f"steady runs of {file}", own
-        if len(own) < len(group):
+        held = group[~swung[group.index]]
+        if len(held):
+            yield f"steady runs of {file}", held
+        if len(held) < len(group):
             yield f"oscillations of {file}", group[swung[group.index]]
     # The mean of a cycle: its two ends of acceleration.
     ends = still & phases["phase"].isin(["+a", "-a"]) & (runs[angle].fillna(0.0) != 0.0)
@@ -117,9 +117,9 @@ def _groups(evidence: Evidence, test: str, angle: str) -> Iterator[tuple[str, pd
 
 def _slope(group: pd.DataFrame, angle: str, output: str, body: Body, widest: float) -> tuple[float, float]:
     """Slope of a prime load over the sine of an angle, odd in it, with its standard error."""
-    own = group[kept(group, output) & (group[angle].abs() <= widest + 1e-9)]
-    x = np.sin(own[angle].to_numpy(float))
-    y = prime(own, output, body).to_numpy(float)
+    straight = group[kept(group, output) & (group[angle].abs() <= widest + 1e-9)]
+    x = np.sin(straight[angle].to_numpy(float))
+    y = prime(straight, output, body).to_numpy(float)
     # An offset of the rig is no slope: it is taken off where both sides were measured.
     if x.size >= 3 and x.min() < 0.0 < x.max():
         design = np.column_stack([np.ones(x.size), x])
@@ -127,7 +127,7 @@ def _slope(group: pd.DataFrame, angle: str, output: str, body: Body, widest: flo
         design = x[:, None]
     if x.size < design.shape[1] or not float(np.abs(x).max(initial=0.0)) > 0.0 or not np.isfinite(y).all():
         return math.nan, math.nan
-    error = prime(own.assign(**{output: own[f"s_{output}"]}), output, body).fillna(0.0).to_numpy(float)
+    error = prime(straight.assign(**{output: straight[f"s_{output}"]}), output, body).fillna(0.0).to_numpy(float)
     inverse = np.linalg.pinv(design)
     slope = float(inverse[-1] @ y)
     left = y - design @ (inverse @ y)

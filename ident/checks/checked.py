@@ -94,8 +94,8 @@ def check(folder: str | os.PathLike[str], each: Callable[[str], None] = lambda t
     for path in places:
         each(str(path))
         every.append(read_campaign(path, leave_out=True))
-    found = []
+    results = []
     for campaign, path in zip(*by_vehicle(every, places), strict=True):
         each(str(path))
-        found.append(Checked(campaign, tuple(check_campaign(campaign, path))))
-    return Results(found)
+        results.append(Checked(campaign, tuple(check_campaign(campaign, path))))
+    return Results(results)

@@ -67,11 +67,11 @@ def mirror_image(runs: pd.DataFrame, vehicle: Vehicle | None) -> pd.DataFrame:
         image[output] = sign * image[output]
     planes = {p.name: p for p in vehicle.planes} if vehicle else {}
     for name, plane in planes.items():
-        own = runs["part"] == name
+        of_part = runs["part"] == name
         partner = planes[plane.mirror]
         turned = float((plane.lift_axis * np.array([1.0, -1.0, 1.0])) @ partner.lift_axis)
-        image.loc[own, "plane"] *= 1.0 if turned > 0.0 else -1.0
-        image.loc[own, "part"] = plane.mirror
+        image.loc[of_part, "plane"] *= 1.0 if turned > 0.0 else -1.0
+        image.loc[of_part, "part"] = plane.mirror
     return image
 
 
@@ -112,15 +112,15 @@ def _independent(runs: pd.DataFrame) -> pd.DataFrame:
 
 def _differences(group: pd.DataFrame) -> str:
     """Which states differ within a group, with their values."""
-    found = []
+    differing = []
     for column in STATES:
         values = sorted(set(group[column].dropna()))
         if len(values) > 1:
             shown = np.rad2deg(values) if column in ("alpha", "beta", "plane") else values
             unit = " deg" if column in ("alpha", "beta", "plane") else ""
-            found.append(f"{column} = {' and '.join(f'{v:.4g}' for v in shown)}{unit}")
+            differing.append(f"{column} = {' and '.join(f'{v:.4g}' for v in shown)}{unit}")
     parts = sorted(set(group["part"]))
-    return ", ".join(found + ([f"parts {' and '.join(parts)}"] if len(parts) > 1 else []))
+    return ", ".join(differing + ([f"parts {' and '.join(parts)}"] if len(parts) > 1 else []))
 
 
 @check("duplicates")
@@ -167,8 +167,8 @@ def mirrored_copies(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
     """Runs that are the mirror image of another to the last digit."""
     runs = _independent(evidence.runs)
     image = mirror_image(runs, evidence.vehicle)
-    own, seen = load_key(runs, rule), load_key(image, rule)
-    here = list(zip(own, state_key(runs), strict=True))
+    loads, seen = load_key(runs, rule), load_key(image, rule)
+    here = list(zip(loads, state_key(runs), strict=True))
     there = list(zip(seen, state_key(image), strict=True))
     first = {k: i for i, k in reversed(list(enumerate(here)))}
     pairs = np.array([(first[k], i) for i, k in enumerate(there) if k[0] and first.get(k, i) < i], dtype=int)
@@ -188,7 +188,7 @@ def frozen_column(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
     odd = [c for c in STATES if c in ("beta", "plane") or c in MIRRORED_FACTORS]
     runs[odd] = runs[odd].abs()
     states, whole = state_key(runs), load_key(runs, rule)
-    found: dict[tuple[str, str, bool], list[pd.DataFrame]] = {}
+    by_file: dict[tuple[str, str, bool], list[pd.DataFrame]] = {}
     for output in OUTPUTS:
         count = pd.Series(digits(runs[output].to_numpy(float)), index=runs.index)
         usable = runs[kept(runs, output) & (count >= rule.limits["digits"])]
@@ -203,9 +203,9 @@ def frozen_column(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
             if states[group.index].nunique() < 2 or same:
                 continue
             known = bool((~declared(evidence, group)).sum() <= 1)
-            for file, own in group.groupby("file", sort=False):
-                found.setdefault((str(file), _axes(group), known), []).append(own.assign(output=output))
-    for (file, varies, known), groups in found.items():
+            for file, of_file in group.groupby("file", sort=False):
+                by_file.setdefault((str(file), _axes(group), known), []).append(of_file.assign(output=output))
+    for (file, varies, known), groups in by_file.items():
         table = pd.concat(groups)
         columns = list(dict.fromkeys(table["output"]))
         what = f"the same to the last digit whatever {varies}: {len(groups)} values of {', '.join(columns)} "

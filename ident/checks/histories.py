@@ -33,8 +33,8 @@ def replaced_clocks(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
         if one.clock is None or one.rate_hz is None or one.file in seen:
             continue
         seen.add(one.file)
-        for found in faults(one.clock, one.file, rule, one.first_row, "info"):
-            yield found.with_words("; rate_hz of the campaign stands in for the stamps")
+        for finding in faults(one.clock, one.file, rule, one.first_row, "info"):
+            yield finding.with_words("; rate_hz of the campaign stands in for the stamps")
         yield from _rate(one, one.clock, one.rate_hz, rule)
 
 
@@ -42,8 +42,8 @@ def replaced_clocks(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
 def refused_clocks(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
     """Histories that were not reduced because their stamps do not rise and nothing stands in for them."""
     for one in evidence.campaign.refused if evidence.campaign else ():
-        for found in faults(one.clock, one.file, rule, one.first_row):
-            yield found.with_words(f"; not reduced, and refused by ident fit (allowed: {one.allowed})")
+        for finding in faults(one.clock, one.file, rule, one.first_row):
+            yield finding.with_words(f"; not reduced, and refused by ident fit (allowed: {one.allowed})")
 
 
 def _rate(one: Reduced, clock: Clock, rate_hz: float, rule: Rule) -> Iterator[Finding]:
@@ -105,8 +105,8 @@ def unsettled(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
     for file, group in files.items():
         words = [f"run {one.run_id}, {one.fit.start:g}-{one.fit.end:g} s: {one.fit.verdict}" for one in group]
         channels = dict.fromkeys(w.split(":")[0] for one in group for w in one.fit.verdict.split("; ") if ":" in w)
-        own = evidence.runs["run_id"].isin([name for one in group for name in one.runs])
-        known = bool(own.any() and declared(evidence, evidence.runs[own]).all())
+        concerned = evidence.runs["run_id"].isin([name for one in group for name in one.runs])
+        known = bool(concerned.any() and declared(evidence, evidence.runs[concerned]).all())
         yield rule.finding(file, [], list(channels), "; ".join(words), milder(rule, known))
 
 

@@ -43,14 +43,14 @@ def against_the_lines(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
     out: dict[str, float] = {}
     files: set[str] = set()
     for test, angle, output, name in _SLOPES:
-        own = runs[(runs["test"] == test) & runs["part"].isin(["", "hull"])]
-        value = slope(own, angle, output, body)
+        of_test = runs[(runs["test"] == test) & runs["part"].isin(["", "hull"])]
+        value = slope(of_test, angle, output, body)
         if not math.isfinite(value) or value == 0.0:
             continue
         ratio = beyond(value, known[name], rule.limits["errors"])
         if not 1.0 / rule.limits["factor"] <= ratio <= rule.limits["factor"]:
             out[name] = ratio
-            files |= set(own["file"].astype(str))
+            files |= set(of_test["file"].astype(str))
     if not out:
         return
     named = ", ".join(f"{name} {ratio:.2g} times" for name, ratio in out.items())
@@ -81,5 +81,5 @@ def _slip(ratios: list[float], apart: float) -> str:
     """The slip that explains every ratio, each within ``apart`` of its factor."""
     if all(r < 0.0 for r in ratios):
         return _SIGN
-    found = [n for n, f in _SLIPS.items() if all(r > 0.0 and abs(math.log(r / f)) < math.log(apart) for r in ratios)]
-    return found[0] if found else ""
+    likely = [n for n, f in _SLIPS.items() if all(r > 0.0 and abs(math.log(r / f)) < math.log(apart) for r in ratios)]
+    return likely[0] if likely else ""

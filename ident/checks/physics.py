@@ -155,8 +155,8 @@ def section_levers(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
     runs = evidence.runs
     rows = {name: k for k, name in reversed(list(enumerate(runs["run_id"])))} if solver.warnings else {}
     for name, text in solver.warnings:
-        own = runs.iloc[rows[name]]
-        yield rule.finding(str(own["file"]), [own["row"]], ["x", "y", "z"], text)
+        of_section = runs.iloc[rows[name]]
+        yield rule.finding(str(of_section["file"]), [of_section["row"]], ["x", "y", "z"], text)
 
 
 @check("angle_name")
@@ -221,9 +221,9 @@ def mass_in_the_loads(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
     if body is None or body.mass is None:
         return
     inertia = body.inertia or (math.nan,) * 3
-    own = dict(zip(ACCELERATIONS, (*(body.mass,) * 3, *inertia), strict=True))
-    for file, acceleration, group, found in _apparent(evidence):
-        ratio = found / own[acceleration]
+    of_body = dict(zip(ACCELERATIONS, (*(body.mass,) * 3, *inertia), strict=True))
+    for file, acceleration, group, apparent in _apparent(evidence):
+        ratio = apparent / of_body[acceleration]
         if not ratio > rule.limits[acceleration[0]]:
             continue
         output, rest = _ANSWERS[acceleration], ratio - 1.0

@@ -84,10 +84,10 @@ def _disagreement(
 ) -> tuple[Array, Array]:
     """(pairs, 6) difference of loads from their image: in standard errors before quality; over the largest there."""
     given = np.column_stack([kept(runs, o) for o in OUTPUTS])
-    seen, own = (t[list(OUTPUTS)].to_numpy(float) for t in (image, runs))
+    seen, stated = (t[list(OUTPUTS)].to_numpy(float) for t in (image, runs))
     sigma = runs[[f"s_{o}" for o in OUTPUTS]].to_numpy(float) / factors(evidence, runs).to_numpy()[:, None]
     both = given[first] & given[second]
-    off = np.where(both, np.abs(own[second] - seen[first]), 0.0)
+    off = np.where(both, np.abs(stated[second] - seen[first]), 0.0)
     scale = dynamic(runs, evidence.body).fillna(1.0) if evidence.body else pd.Series(1.0, index=runs.index)
     largest = (runs[list(OUTPUTS)].abs().div(scale, axis=0)).groupby([runs["file"], runs["test"]]).transform("max")
     size = np.where(both, largest.to_numpy()[second] * scale.to_numpy()[second, None], 1.0)
@@ -179,11 +179,11 @@ class Series:
         offset = at - self.at[:, None]
         for size in range(2, _NEAR + 1):
             for terms in (2, 3):
-                own = np.flatnonzero((count == size) & (distinct >= 2) & ((distinct >= 4) == (terms == 3)))
-                if own.size:
-                    x = offset[own, :size] / np.abs(offset[own, :size]).max(axis=1, keepdims=True)
-                    weight[own, :size] = np.linalg.pinv(x[:, :, None] ** np.arange(terms))[:, 0, :]
-                    noise[own] = np.sqrt(1.0 + (weight[own] ** 2).sum(axis=1))
+                fitted = np.flatnonzero((count == size) & (distinct >= 2) & ((distinct >= 4) == (terms == 3)))
+                if fitted.size:
+                    x = offset[fitted, :size] / np.abs(offset[fitted, :size]).max(axis=1, keepdims=True)
+                    weight[fitted, :size] = np.linalg.pinv(x[:, :, None] ** np.arange(terms))[:, 0, :]
+                    noise[fitted] = np.sqrt(1.0 + (weight[fitted] ** 2).sum(axis=1))
         return Fits(near, weight, noise)
 
     def _nearest(self, given: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -223,7 +223,7 @@ def _series(evidence: Evidence) -> list[Series]:
     loads[:, 3:] /= evidence.body.length
     first = ~pd.DataFrame({"owner": owner, "state": state_key(table)}).duplicated().to_numpy()
     tests = pd.util.hash_array(table["test"].to_numpy(object))
-    found = []
+    series = []
     for axis in _AXES:
         at = table[axis].to_numpy(float)
         usable = first & (np.nan_to_num(at) > 0.0 if axis in _LOGARITHMIC else np.isfinite(scale))
@@ -236,8 +236,8 @@ def _series(evidence: Evidence) -> list[Series]:
         order = places[np.argsort(rest[places], kind="stable")]
         for group in np.split(order, np.flatnonzero(np.diff(rest[order])) + 1):
             if group.size >= 3 and np.unique(owner[group]).size >= 3 and np.unique(at[group].round(9)).size >= 3:
-                found.append(Series(axis, at[group], loads[group], owner[group]))
-    return found
+                series.append(Series(axis, at[group], loads[group], owner[group]))
+    return series
 
 
 def deviations(evidence: Evidence, every: list[Series]) -> pd.DataFrame:
@@ -266,12 +266,12 @@ def deviations(evidence: Evidence, every: list[Series]) -> pd.DataFrame:
                 fits[known.tobytes()] = series.local_fits(known)
             local = fits[known.tobytes()]
             point = np.flatnonzero(np.isfinite(local.noise))
-            own = (point, series.owner[point], series.at[point].round(6), values[point], local.at(values)[point])
-            for column, piece in zip(pieces.values(), (*own, local.noise[point]), strict=True):
+            columns = (point, series.owner[point], series.at[point].round(6), values[point], local.at(values)[point])
+            for column, piece in zip(pieces.values(), (*columns, local.noise[point]), strict=True):
                 column.append(piece)
             places.append((number, output, series.axis, stencil))
     size = [len(piece) for piece in pieces["point"]]
-    table = pd.DataFrame({name: np.concatenate([np.zeros(0), *own]) for name, own in pieces.items()})
+    table = pd.DataFrame({name: np.concatenate([np.zeros(0), *columns]) for name, columns in pieces.items()})
     table = table.astype({"point": int, "owner": evidence.runs.index.dtype})
     for k, (name, kind_of) in enumerate({"series": int, "output": object, "axis": object, "stencil": int}.items()):
         table[name] = np.repeat(np.array([place[k] for place in places], dtype=kind_of), size)
@@ -290,14 +290,14 @@ def deviations(evidence: Evidence, every: list[Series]) -> pd.DataFrame:
 
 def _own_error(evidence: Evidence, table: pd.DataFrame) -> Array:
     """Dimensionless standard error of each run's load before its quality factor."""
-    own = np.zeros(len(table))
+    error = np.zeros(len(table))
     for output in OUTPUTS:
         here = (table["output"] == output).to_numpy()
         runs = evidence.runs.loc[table["owner"][here]]
         size = runs[output].abs().where(runs[output] != 0.0)
         relative = (runs[f"s_{output}"] / size / factors(evidence, runs)).fillna(runs["rel_sigma"]).fillna(0.0)
-        own[here] = relative.to_numpy(float) * table["load"][here].abs().to_numpy(float)
-    return own
+        error[here] = relative.to_numpy(float) * table["load"][here].abs().to_numpy(float)
+    return error
 
 
 def _culprit(group: pd.DataFrame, series: Series) -> int:
@@ -358,9 +358,9 @@ def slipped_points(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
     """Loads that are a power of ten away from what their neighbours say."""
     if evidence.body is None:
         return
-    found = flagged(evidence, rule.limits["deviation"])
-    found["decade"] = np.array([_decade(row, rule.limits["decades"]) for _, row in found.iterrows()], dtype=int)
-    for _, group in found[found["decade"] != 0].groupby(["owner", "decade"], sort=False):
+    suspects = flagged(evidence, rule.limits["deviation"])
+    suspects["decade"] = np.array([_decade(row, rule.limits["decades"]) for _, row in suspects.iterrows()], dtype=int)
+    for _, group in suspects[suspects["decade"] != 0].groupby(["owner", "decade"], sort=False):
         worst = group.iloc[0]
         run, decade = evidence.runs.loc[worst["owner"]], int(worst["decade"])
         outputs = [o for o in OUTPUTS if o in set(group["output"])]
@@ -376,11 +376,11 @@ def out_of_line(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
     if evidence.body is None:
         return
     near = rules()["factor"].limits["decades"]
-    found = flagged(evidence, rule.limits["deviation"])
-    found = found[np.array([_decade(row, near) == 0 for _, row in found.iterrows()], dtype=bool)]
-    runs = evidence.runs.loc[found["owner"]]
-    found = found.assign(file=runs["file"].to_numpy(), known=declared(evidence, runs).to_numpy())
-    for (file, known), group in found.groupby(["file", "known"], sort=False):
+    suspects = flagged(evidence, rule.limits["deviation"])
+    suspects = suspects[np.array([_decade(row, near) == 0 for _, row in suspects.iterrows()], dtype=bool)]
+    runs = evidence.runs.loc[suspects["owner"]]
+    suspects = suspects.assign(file=runs["file"].to_numpy(), known=declared(evidence, runs).to_numpy())
+    for (file, known), group in suspects.groupby(["file", "known"], sort=False):
         worst = group.iloc[0]
         run = evidence.runs.loc[worst["owner"]]
         outputs = [o for o in OUTPUTS if o in set(group["output"])]

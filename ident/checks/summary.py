@@ -44,15 +44,15 @@ def lines(findings: Sequence[Finding], width: int, most: int = MOST) -> list[tup
     shown: list[tuple[str, str]] = []
     rest = list(groups.items())
     while rest and len(shown) < most - (len(rest) > 1):
-        (severity, name), own = rest.pop(0)
-        first = own[0]
+        (severity, name), group = rest.pop(0)
+        first = group[0]
         rows = f" row {first.shown_rows}" if first.rows and len(first.shown_rows) < 12 else ""
-        times = f" x{len(own)}" if len(own) > 1 else ""
+        times = f" x{len(group)}" if len(group) > 1 else ""
         text = f"{severity:7} {name}{times}: {cut(first.file, 32)}{rows}: {first.what}"
         shown.append((severity, cut(text, width)))
         if severity == "error" and len(shown) < most - (len(rest) > 0):
             shown.append(("", cut(f"        -> {first.remedy}", width)))
     if rest:
-        more = sum(len(own) for _, own in rest)
+        more = sum(len(group) for _, group in rest)
         shown.append(("", cut(f"and {more} findings of {len(rest)} more checks", width)))
     return shown

@@ -37,20 +37,20 @@ def symbol(name: str) -> str:
 def _values(table: pd.DataFrame) -> dict[str, tuple[float, str, int]]:
     """Name -> (value, file, row); the file may be missing."""
     numbers = pd.to_numeric(table["value"], errors="coerce")
-    found = {}
+    values = {}
     for i, (name, value) in enumerate(zip(table["coefficient"], numbers, strict=True)):
         if math.isfinite(value):
             file = str(table["file"].iloc[i]) if "file" in table else ""
-            found[symbol(str(name))] = (float(value), file, int(table["row"].iloc[i]) if "row" in table else i + 2)
-    return found
+            values[symbol(str(name))] = (float(value), file, int(table["row"].iloc[i]) if "row" in table else i + 2)
+    return values
 
 
 def _relative_errors(table: pd.DataFrame, *names: str) -> list[float]:
     """Standard errors over values, where the table has a column ``stderr``; else zero."""
     if "stderr" not in table:
         return [0.0]
-    own = table[[symbol(str(n)) in names for n in table["coefficient"]]]
-    return [abs(e / v) for v, e in zip(own["value"], own["stderr"], strict=True) if v]
+    of_names = table[[symbol(str(n)) in names for n in table["coefficient"]]]
+    return [abs(e / v) for v, e in zip(of_names["value"], of_names["stderr"], strict=True) if v]
 
 
 def vertical_partner(name: str) -> tuple[str, int] | None:
@@ -143,12 +143,13 @@ def _added_mass_norm(known: dict[str, tuple[float, str, int]], evidence: Evidenc
     assert body is not None
     if "Yvdot" not in known or body.mass is None or not body.draught:
         return
-    own = body.mass / (0.5 * body.density * body.length**3)
+    displaced = body.mass / (0.5 * body.density * body.length**3)
     value, file, row = known["Yvdot"]
     limits, step = rules()["inertia_left_in"].limits, body.length / body.draught
-    if abs(value) / own > limits["v"] and limits["least"] <= abs(value) / own / step <= limits["v"]:
-        text = f"Y_vdot = {value:g} is {abs(value) / own:.1f} times the displaced mass {own:.3g} in 1/2 rho L^2; "
-        yield rule.finding(file, [row], ["Y_vdot"], text + f"in 1/2 rho L d it would be {abs(value) / own / step:.2f}")
+    times = abs(value) / displaced
+    if times > limits["v"] and limits["least"] <= times / step <= limits["v"]:
+        text = f"Y_vdot = {value:g} is {times:.1f} times the displaced mass {displaced:.3g} in 1/2 rho L^2; "
+        yield rule.finding(file, [row], ["Y_vdot"], text + f"in 1/2 rho L d it would be {times / step:.2f}")
 
 
 @cache
@@ -164,9 +165,9 @@ def descriptions(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
         return
     for _, label in evidence.labels.iterrows():
         name = re.sub(r"['_ ].*$|_?mean'?$", "", str(label["column"]).strip())
-        own, foreign = _words().get(name, (set(), set()))
+        words_of, foreign = _words().get(name, (set(), set()))
         words = set(re.findall(r"[a-z]+", str(label["description"]).lower()))
-        if words & foreign and not words & own:
+        if words & foreign and not words & words_of:
             sheet = f" on sheet {label['sheet']!r}" if label["sheet"] else ""
             text = f"column {name!r} is described as {label['description']!r}{sheet}"
             yield rule.finding(str(label["file"]), [label["row"]], [name], text)
@@ -245,7 +246,7 @@ def unsupported_terms(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
     if campaign is None:
         return
     solver = Solver(campaign)
-    seen, own = set(), set()
+    seen, identified = set(), set()
     runs = Runs.of(campaign.runs)
     # Whether a state has a run of its own, beside copies of others that are no mirror images.
     first_hand = (runs.words("copy_of") == "") | (runs.words("quality") == "mirrored")
@@ -254,7 +255,7 @@ def unsupported_terms(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
         features = solver.features(run)
         if run["test"] == PUBLISHED:
             term = solver.by_name[run["coefficient"]]
-            own.add(solver.canonical(term.name, run["part"], solver.place(term, features))[0][:2])
+            identified.add(solver.canonical(term.name, run["part"], solver.place(term, features))[0][:2])
             continue
         given = [o for o in (*OUTPUTS, *PROPULSION) if not math.isnan(run[o]) and o not in run["exclude"].split()]
         names = {(o, "propeller") for o in given if o in PROPULSION}
@@ -263,7 +264,7 @@ def unsupported_terms(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
                 key, sign = solver.canonical(term.name, run["part"], solver.place(term, features))
                 names |= {key[:2]} if run["test"] in term.tests and sign else set()
         seen |= names
-        own |= names if measured[state] else set()
+        identified |= names if measured[state] else set()
     absent: dict[str, list[str]] = {}
     copied: dict[str, list[str]] = {}
     for term in vehicle_terms(campaign.vehicle):
@@ -273,7 +274,7 @@ def unsupported_terms(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
         keys = {(m.name, m.part) for k, m in solver.mirrors.items() if k[0] == term.name}
         keys |= {(term.name, part) for part in parts_of(term, campaign.vehicle)}
         idle = all(vanishes(term, part, campaign.vehicle) for part in parts_of(term, campaign.vehicle))
-        if term.name != "w_T" and not idle and not keys & own:
+        if term.name != "w_T" and not idle and not keys & identified:
             (copied if keys & seen else absent).setdefault(" or ".join(term.tests), []).append(term.name)
     for groups, text, severity in (
         (absent, "no run or published value gives", rule.severity),
@@ -291,11 +292,11 @@ def signs_behind_numbers(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
     if "notes" not in runs:
         return
     noted = runs[runs["notes"].fillna("") != ""]
-    for file, own in noted.groupby("file", sort=False):
-        every = [note for text in own["notes"] for note in text.split("; ")]
+    for file, of_file in noted.groupby("file", sort=False):
+        every = [note for text in of_file["notes"] for note in text.split("; ")]
         signs = [n for n in every if n.endswith("+-")]
         marks = dict.fromkeys(n.split(": ")[1] for n in every if not n.endswith("+-"))
         words = [f"{len(signs)} errors behind numbers, read as one standard error each"] if signs else []
         words += [f"footnote marks {' '.join(marks)} behind {len(every) - len(signs)} numbers"] if marks else []
         columns = list(dict.fromkeys(n.split(": ")[0] for n in every))
-        yield rule.finding(str(file), own["row"], columns, "; ".join(words))
+        yield rule.finding(str(file), of_file["row"], columns, "; ".join(words))

@@ -41,14 +41,14 @@ def needs(module: str, extra: str, path: Path, kind: str) -> Any:
 def with_units(names: Sequence[str], units: Sequence[str], source: Source) -> list[str]:
     """Names with the unit that the file stores beside them in brackets, where the name has none of its own."""
     declared = {*source.columns, *(name for one in source.subtract for name in one.columns)}
-    found = []
+    named = []
     for name, unit in zip(names, units, strict=True):
         bare = split(name)[1] is None and name not in suffixed() and (name in declared or owner(name.rstrip("'")))
-        found.append(f"{name} [{unit.strip()}]" if bare and unit.strip() else name)
-    return found
+        named.append(f"{name} [{unit.strip()}]" if bare and unit.strip() else name)
+    return named
 
 
-def chosen(path: Path, found: Sequence[str], source: Source, what: str) -> str:
+def chosen(path: Path, names: Sequence[str], source: Source, what: str) -> str:
     """Which table (worksheet, group, variable) of a file to read.
 
     Raises
@@ -57,14 +57,14 @@ def chosen(path: Path, found: Sequence[str], source: Source, what: str) -> str:
         For a name that is not there, or several tables and none named.
     """
     if source.table:
-        if source.table not in found:
-            shown = ", ".join(map(repr, found))[:200]
+        if source.table not in names:
+            shown = ", ".join(map(repr, names))[:200]
             raise InputError(f"{path}, key source.table", f"no {what} {source.table!r}", shown or "none is there")
         return source.table
-    if len(found) != 1:
-        text = f"table = '...' in [[source]]: one of {', '.join(map(repr, found))[:200]}" if found else f"a {what}"
-        raise InputError(str(path), f"{len(found)} {what}s with columns", text)
-    return found[0]
+    if len(names) != 1:
+        text = f"table = '...' in [[source]]: one of {', '.join(map(repr, names))[:200]}" if names else f"a {what}"
+        raise InputError(str(path), f"{len(names)} {what}s with columns", text)
+    return names[0]
 
 
 def array_sheet(path: Path, names: Sequence[str], columns: Sequence[Any], source: Source, first_row: int = 1) -> Sheet:

@@ -42,16 +42,16 @@ def open_hdf5(path: Path, source: Source) -> Sheet:
     except (OSError, RuntimeError, KeyError, ValueError) as error:
         raise InputError(str(path), f"not an HDF5 file: {str(error)[:100]}", "a whole file") from error
     name = chosen(path, list(groups), source, "group")
-    found = groups[name]
-    longest = max(len(v) for v, _ in found.values())
-    found = {k: v for k, v in found.items() if len(v[0]) == longest}
-    header = with_units(list(found), [u for _, u in found.values()], source)
-    return array_sheet(path, header, [v for v, _ in found.values()], source)
+    vectors = groups[name]
+    longest = max(len(v) for v, _ in vectors.values())
+    vectors = {k: v for k, v in vectors.items() if len(v[0]) == longest}
+    header = with_units(list(vectors), [u for _, u in vectors.values()], source)
+    return array_sheet(path, header, [v for v, _ in vectors.values()], source)
 
 
 def _collect(h5py: Any, group: Any, name: str, groups: dict[str, Any], source: Source) -> None:
     """Columns of every group, by its path; a compound dataset or a matrix is a group of its own."""
-    own: dict[str, tuple[np.ndarray, str]] = {}
+    vectors: dict[str, tuple[np.ndarray, str]] = {}
     for key, item in group.items():
         path = f"{name}/{key}".lstrip("/")
         if isinstance(item, h5py.Group):
@@ -66,7 +66,7 @@ def _collect(h5py: Any, group: Any, name: str, groups: dict[str, Any], source: S
             if item.size > 1 and item.dtype.kind in "iufSUO":
                 values = np.ravel(item[()])
                 text = item.dtype.kind in "SUO"
-                own[key] = (np.array([_text(v) for v in values], dtype=object) if text else values, stated)
+                vectors[key] = (np.array([_text(v) for v in values], dtype=object) if text else values, stated)
         elif item.ndim == 2 and item.dtype.kind in "iuf":
             labels = source.names or [_text(v) for v in np.ravel(item.attrs.get("columns", []))]
             values = item[()]
@@ -74,8 +74,8 @@ def _collect(h5py: Any, group: Any, name: str, groups: dict[str, Any], source: S
             values = values if len(labels) == values.shape[1] else values.T
             if len(labels) == values.shape[1]:
                 groups[path] = {str(n): (values[:, i], "") for i, n in enumerate(labels)}
-    if own:
-        groups[name or "/"] = own
+    if vectors:
+        groups[name or "/"] = vectors
 
 
 def open_netcdf(path: Path, source: Source) -> Sheet:
@@ -93,16 +93,16 @@ def open_netcdf(path: Path, source: Source) -> Sheet:
 
     try:
         with netcdf_file(str(path), "r", mmap=False) as opened:
-            found = {
+            vectors = {
                 str(k): (np.array(v[:], dtype=float), unit(_text(getattr(v, "units", ""))))
                 for k, v in opened.variables.items()
                 if v[:].ndim == 1 and v[:].dtype.kind in "iuf" and v[:].size > 1
             }
     except (OSError, ValueError, TypeError, IndexError, KeyError) as error:
         raise InputError(str(path), f"not a netCDF file: {str(error)[:100]}", "a whole file") from error
-    if not found:
+    if not vectors:
         raise InputError(str(path), "no variables of one dimension", "variables of one length")
-    longest = max(len(v) for v, _ in found.values())
-    found = {k: v for k, v in found.items() if len(v[0]) == longest}
-    header = with_units(list(found), [u for _, u in found.values()], source)
-    return array_sheet(path, header, [v for v, _ in found.values()], source)
+    longest = max(len(v) for v, _ in vectors.values())
+    vectors = {k: v for k, v in vectors.items() if len(v[0]) == longest}
+    header = with_units(list(vectors), [u for _, u in vectors.values()], source)
+    return array_sheet(path, header, [v for v, _ in vectors.values()], source)

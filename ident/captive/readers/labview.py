@@ -74,12 +74,12 @@ def open_lvm(path: Path, source: Source) -> Sheet:
     separator = {"Tab": "\t", "Comma": ","}.get(words.get("Separator", "Tab").strip(), "\t")
     decimal = words.get("Decimal_Separator", ".").strip()[:1] or "."
     names = first.text[ends[-1] + 1] if ends[-1] + 1 < len(first.text) else ""
-    own = {"header_pattern": "^" + re.escape(names[:120]), "delimiter": separator}
-    own |= {} if source.decimal else {"decimal": decimal}
+    layout = {"header_pattern": "^" + re.escape(names[:120]), "delimiter": separator}
+    layout |= {} if source.decimal else {"decimal": decimal}
     skip = source.skip or r"\*\*\*End_of_Header\*\*\*"
-    found = open_csv(path, source.model_copy(update={**own, "skip": skip}))
-    if "X_Value" in found.header and found.header.count("X_Value") > 1:
+    sheet = open_csv(path, source.model_copy(update={**layout, "skip": skip}))
+    if "X_Value" in sheet.header and sheet.header.count("X_Value") > 1:
         raise InputError(
-            found.where, "an X_Value for each channel", "one X column (X_Columns One), or a file a channel"
+            sheet.where, "an X_Value for each channel", "one X column (X_Columns One), or a file a channel"
         )
-    return found
+    return sheet

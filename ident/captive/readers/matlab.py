@@ -31,13 +31,13 @@ def open_matlab(path: Path, source: Source) -> Sheet:
     from scipy.io import loadmat
 
     try:
-        found = loadmat(str(path), squeeze_me=True, struct_as_record=False)
+        stored = loadmat(str(path), squeeze_me=True, struct_as_record=False)
     except (ValueError, TypeError, NotImplementedError, OSError, MemoryError, IndexError, KeyError) as error:
         raise InputError(
             str(path), f"not a MATLAB file: {str(error)[:100]}", "a whole file of save -v7 or -v7.3"
         ) from error
-    own = {k: v for k, v in found.items() if not k.startswith("__")}
-    return from_variables(path, own, source)
+    variables = {k: v for k, v in stored.items() if not k.startswith("__")}
+    return from_variables(path, variables, source)
 
 
 def _fields(value: Any) -> dict[str, Any] | None:
@@ -51,9 +51,9 @@ def from_variables(path: Path, variables: dict[str, Any], source: Source) -> She
     groups: dict[str, dict[str, Any]] = {}
     for name, value in variables.items():
         fields = _fields(value) if not isinstance(value, dict) else value
-        own = {k: np.ravel(v) for k, v in (fields or {}).items() if _vector(v)}
-        if own:
-            groups[name] = own
+        inside = {k: np.ravel(v) for k, v in (fields or {}).items() if _vector(v)}
+        if inside:
+            groups[name] = inside
         elif isinstance(value, np.ndarray) and value.ndim == 2 and value.dtype.kind in "iuf":
             groups[name] = {str(i): column for i, column in enumerate(value.T)}
     if vectors and (not source.table or source.table not in groups):

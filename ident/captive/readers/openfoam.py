@@ -88,10 +88,10 @@ def read_layout(path: Path) -> Layout:
         raise InputError(where, "force coefficients (forceCoeffs)", allowed)
     rest = re.sub(r"^#\s*Time\s*", "", text)
     centre = next((m for _, t in comments if (m := _COFR.match(t))), None)
-    found = [_PLAIN.number(cell) for cell in centre[1].strip("() ").split()] if centre else []
-    if centre and (None in found or not np.isfinite(np.array(found, dtype=float)).all()):
+    numbers = [_PLAIN.number(cell) for cell in centre[1].strip("() ").split()] if centre else []
+    if centre and (None in numbers or not np.isfinite(np.array(numbers, dtype=float)).all()):
         raise InputError(where, centre[1][:80], "a moment point '# CofR : (x y z)' of numbers")
-    point = np.array(found, dtype=float) if found else None
+    point = np.array(numbers, dtype=float) if numbers else None
     if _GROUP.search(rest):
         return _grouped(where, rest, point)
     return _single(where, rest, title, point)
@@ -201,7 +201,7 @@ def series(folder: Path, stems: tuple[str, ...]) -> list[Path]:
     folder : ``postProcessing/<function object>``.
     stems : Possible names: ``forces``, ``movingForces``, ``force``, ``moment``.
     """
-    found = []
+    parts = []
     for start in folder.iterdir():
         if not (start.is_dir() and _time(start.name) is not None):
             continue
@@ -209,8 +209,8 @@ def series(folder: Path, stems: tuple[str, ...]) -> list[Path]:
             stem, _, later = path.stem.partition("_")
             # A restart at the same time writes forces_<time>.dat beside forces.dat.
             if path.suffix == ".dat" and stem in stems and (not later or _time(later) is not None):
-                found.append((_time(start.name), later != "", _time(later) if later else 0.0, path))
-    return [f[-1] for f in sorted(found, key=lambda f: f[:3])]
+                parts.append((_time(start.name), later != "", _time(later) if later else 0.0, path))
+    return [f[-1] for f in sorted(parts, key=lambda f: f[:3])]
 
 
 def _time(name: str) -> float | None:
@@ -280,10 +280,10 @@ def loads(folder: Path, stated: Sequence[float] | None = None) -> Iterator[tuple
         for layout, path, row, values in merged(together):
             if layout.forces.size == 0:
                 raise InputError(f"{path}, row 1", "one group of loads", "forces and moments")
-            found = np.column_stack([values[:, 0], _sums(layout.forces, values), _sums(layout.moments, values)])
+            columns = np.column_stack([values[:, 0], _sums(layout.forces, values), _sums(layout.moments, values)])
             moving = bool(layout.moving)
             centre = values[:, layout.moving] if moving else _point(layout, path, row, stated)
-            yield found, centre, moving
+            yield columns, centre, moving
         return
     forces, moments = series(folder, ("force",)), series(folder, ("moment",))
     if not forces or len(forces) != len(moments):
@@ -298,8 +298,8 @@ def _point(layout: Layout, path: Path, row: int, stated: Sequence[float] | None)
         text = "a line '# CofR : (x y z)', or cofr = [x, y, z] in [[source]]: the CofR of the function object"
         raise InputError(f"{path}, row {row}", "no moment point", text)
     if layout.centre is not None and stated is not None:
-        found = f"cofr = {list(stated)} stated, and CofR {layout.centre} in the header"
-        raise InputError(f"{path}, row 1 (header)", found, "cofr for files alone that name none")
+        wrong = f"cofr = {list(stated)} stated, and CofR {layout.centre} in the header"
+        raise InputError(f"{path}, row 1 (header)", wrong, "cofr for files alone that name none")
     return np.array(stated, dtype=float) if layout.centre is None else layout.centre
 
 
@@ -309,14 +309,14 @@ def _sums(positions: Array, values: Array) -> Array:
 
 def _checked(layout: Layout, path: Path, row: int, values: Array) -> Array:
     """Sums of the shares, held against the written totals (printed with 6 digits or more)."""
-    found = _sums(layout.forces if layout.forces.size else layout.moments, values)
+    sums = _sums(layout.forces if layout.forces.size else layout.moments, values)
     totals = values[:, layout.totals[:, 0]]
     size = np.abs(values[:, 1:]).max(axis=1, keepdims=True)
-    off = np.flatnonzero((np.abs(found - totals) > 1e-3 * size).any(axis=1))
+    off = np.flatnonzero((np.abs(sums - totals) > 1e-3 * size).any(axis=1))
     if off.size:
         place = f"{path}, rows from {row}, time {values[off[0], 0]:g}, column total"
         raise InputError(place, "a total that is not pressure + viscous (+ porous)", "columns as the header says")
-    return found
+    return sums
 
 
 def _paired(
@@ -369,9 +369,9 @@ def objects(case: Path) -> dict[str, Path]:
     names = ("forces", "movingForces", "force", "moment")
     if series(root, names):
         return {root.name: root}
-    own = {p.name: p for p in sorted(root.iterdir()) if p.is_dir() and series(p, names)}
+    here = {p.name: p for p in sorted(root.iterdir()) if p.is_dir() and series(p, names)}
     # A case of several regions has a folder for each between.
-    regions = [p for p in sorted(root.iterdir()) if p.is_dir() and p.name not in own and _time(p.name) is None]
+    regions = [p for p in sorted(root.iterdir()) if p.is_dir() and p.name not in here and _time(p.name) is None]
     inside = [(r, p) for r in regions for p in sorted(r.iterdir()) if p.is_dir() and series(p, names)]
-    several = len({r for r, _ in inside}) > 1 or bool(own)
-    return own | {f"{r.name}/{p.name}" if several else p.name: p for r, p in inside}
+    several = len({r for r, _ in inside}) > 1 or bool(here)
+    return here | {f"{r.name}/{p.name}" if several else p.name: p for r, p in inside}

@@ -66,23 +66,23 @@ def matching(folder: Path, source: Source) -> list[Path]:
     """
     try:
         # Does not follow links to folders below **, which may lead round in circles.
-        found = sorted(p for p in folder.glob(source.files) if not _is_hidden(p, folder, source.files))
+        files = sorted(p for p in folder.glob(source.files) if not _is_hidden(p, folder, source.files))
     except (ValueError, IndexError, NotImplementedError, re.error, OSError):
-        found = []
-    lost = {p: o for p in found for o in on_coarser_grids(p, folder, source) if not o.exists()}
+        files = []
+    lost = {p: o for p in files for o in on_coarser_grids(p, folder, source) if not o.exists()}
     if lost and not source.awaited:
         path, other = next(iter(lost.items()))
         raise InputError(
             f"{folder / 'campaign.toml'}, key source.grids", f"no {other} beside {path}", "all three grids"
         )
     # A run that is awaited counts once it is back from all of its grids, and one of a deduction with its towed twin.
-    found = [path for path in found if path not in lost]
+    files = [path for path in files if path not in lost]
     if source.awaited and source.deduction is not None:
         towed = source.model_copy(update={"files": source.deduction.towed, "deduction": None})
-        found = found if matching(folder, towed) else []
-    if not found and not source.awaited:
+        files = files if matching(folder, towed) else []
+    if not files and not source.awaited:
         raise InputError(f"{folder / 'campaign.toml'}, key source.files", f"no file {source.files!r}", "a path or glob")
-    return found
+    return files
 
 
 def _is_hidden(path: Path, folder: Path, pattern: str) -> bool:
@@ -122,8 +122,8 @@ def reader_of(path: Path, source: Source) -> str:
         with opened(path) as stream:
             start = stream.read(20)
     except (OSError, EOFError) as error:
-        found = getattr(error, "strerror", None) or str(error)
-        raise InputError(str(path), f"cannot be read: {found}", "a readable file") from error
+        reason = getattr(error, "strerror", None) or str(error)
+        raise InputError(str(path), f"cannot be read: {reason}", "a readable file") from error
     said = next((reader for mark, reader in _BEGIN.items() if start.startswith(mark)), _ENDINGS.get(path.suffix, ""))
     if said:
         return "matlab" if said == "hdf5" and path.suffix == ".mat" else said
@@ -172,5 +172,5 @@ def inputs(path: Path) -> list[Path]:
     """Every file at or below a path that a reader may look at, for the digests."""
     if path.is_file():
         return [path]
-    names = ((root, n) for root, _, found in os.walk(path) for n in found)
+    names = ((root, n) for root, _, files in os.walk(path) for n in files)
     return sorted(Path(root) / n for root, n in names if n.endswith(".dat") and n.split(".")[0].split("_")[0] in _LOADS)

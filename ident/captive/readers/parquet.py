@@ -72,8 +72,8 @@ def open_parquet(path: Path, source: Source) -> Sheet:
             for name in names:
                 _check_lengths(path, row, name, batch.column(name))
             columns = [batch.column(name).to_pylist() for name in names]
-            for i, found in enumerate(zip(*columns, strict=True)):
-                yield row + i, ["" if c is None else _written(c) for c in found]
+            for i, row_of_cells in enumerate(zip(*columns, strict=True)):
+                yield row + i, ["" if c is None else _written(c) for c in row_of_cells]
 
     return Sheet(path, 0, header, values, cells, _PLAIN, spacers=(_INDEX,))
 
@@ -85,8 +85,8 @@ def _check_sizes(path: Path, metadata: Any) -> None:
             # A page of a few cells has a dictionary and a head besides.
             if column.total_uncompressed_size > LONGEST_CELL * (column.num_values + 100):
                 place, size = f"{path}, column {column.path_in_schema[:60]}", column.total_uncompressed_size
-                found = f"{size} bytes in {column.num_values} cells"
-                raise InputError(place, found, f"cells of {LONGEST_CELL} bytes at most")
+                wrong = f"{size} bytes in {column.num_values} cells"
+                raise InputError(place, wrong, f"cells of {LONGEST_CELL} bytes at most")
 
 
 def _check_lengths(path: Path, row: int, name: str, array: Any) -> None:
@@ -120,8 +120,8 @@ def _with_units(schema: Any, declared: set[str]) -> list[str]:
         stored = {}
     header = []
     for name, field in zip(schema.names, schema, strict=True):
-        own = field.metadata or {}
-        unit = own.get(b"unit", own.get(b"units", b"")).decode("utf-8", "replace")
+        metadata = field.metadata or {}
+        unit = metadata.get(b"unit", metadata.get(b"units", b"")).decode("utf-8", "replace")
         unit = unit or (stored.get(name) if isinstance(stored, dict) else None)
         bare = split(str(name))[1] is None and name not in suffixed() and (name in declared or owner(name.rstrip("'")))
         header.append(f"{name} [{unit.strip()}]" if bare and isinstance(unit, str) and unit.strip() else str(name))

@@ -49,16 +49,16 @@ def open_su2(path: Path, source: Source) -> Sheet:
     InputError
         For what the reader of tables refuses.
     """
-    found = open_csv(path, source)
-    if "Time_Iter" not in found.header or "Inner_Iter" not in found.header:
-        return found
-    every = np.vstack(list(found.numbers(list(range(len(found.header))))))
-    step = every[:, found.header.index("Time_Iter")]
+    sheet = open_csv(path, source)
+    if "Time_Iter" not in sheet.header or "Inner_Iter" not in sheet.header:
+        return sheet
+    every = np.vstack(list(sheet.numbers(list(range(len(sheet.header))))))
+    step = every[:, sheet.header.index("Time_Iter")]
     if np.unique(step).size < 2:
-        return found
+        return sheet
     last = np.append(np.diff(step) != 0.0, True)
     kept = every[last]
-    return array_sheet(path, found.header, list(kept.T), source, found.first_row)
+    return array_sheet(path, sheet.header, list(kept.T), source, sheet.first_row)
 
 
 def plots(rows: list[list[str]]) -> bool:
@@ -81,9 +81,9 @@ def open_plots(path: Path, source: Source, dialect: Dialect) -> Sheet:
             (row, dialect.cells(line, f"{path}, row {row}")) for row, line in zip(block.rows, block.text, strict=True)
         ]
     names = lines[0][1]
-    found: list[dict[float, float]] = [{} for _ in names[1::2]]
+    plots: list[dict[float, float]] = [{} for _ in names[1::2]]
     for row, cells in lines[1:]:
-        for k, series in enumerate(found):
+        for k, series in enumerate(plots):
             pair = cells[2 * k : 2 * k + 2]
             if len(pair) < 2 or not any(pair):
                 continue
@@ -92,11 +92,11 @@ def open_plots(path: Path, source: Source, dialect: Dialect) -> Sheet:
                 place = f"{path}, row {row}, column {names[2 * k + 1][:60]}"
                 raise InputError(place, repr(" ".join(pair)[:60]), "an abscissa and a number, or both blank")
             series[at] = value
-    common = sorted(set(found[0]).intersection(*found[1:]))
+    common = sorted(set(plots[0]).intersection(*plots[1:]))
     if not common:
         text = "plots of the same iterations or times"
         raise InputError(f"{path}, row {lines[0][0]} (header)", f"no {names[0]} that all plots have", text)
-    columns = [np.array(common)] + [np.array([series[a] for a in common]) for series in found]
+    columns = [np.array(common)] + [np.array([series[a] for a in common]) for series in plots]
     return array_sheet(path, [names[0], *names[1::2]], columns, source, lines[0][0] + 1)
 
 
@@ -146,8 +146,8 @@ def open_tecplot(path: Path, source: Source) -> Sheet:
     name = chosen(path, list(zones), source, "zone")
     packing, values, row = zones[name]
     if not names or not values or len(values) % len(names):
-        found = f"{len(values)} numbers for {len(names)} variables in zone {name!r}"
-        raise InputError(f"{path}, rows {row} to {place}", found, "as many of each variable")
+        wrong = f"{len(values)} numbers for {len(names)} variables in zone {name!r}"
+        raise InputError(f"{path}, rows {row} to {place}", wrong, "as many of each variable")
     table = np.array(values).reshape((-1, len(names)) if packing == "POINT" else (len(names), -1))
     columns = list(table.T) if packing == "POINT" else list(table)
     return array_sheet(path, names, columns, source, row + 1)

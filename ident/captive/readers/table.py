@@ -226,9 +226,9 @@ def open_columns(path: Path, source: Source) -> Sheet:
         ):
             lines = Lines([first.rows[max(at, 0)]], [first.text[max(at, 0)]])
             return _text_sheet(path, source, dialect, header, lines, row - 1)
-    found = f"no line with {len(header)} numbers in the first {len(first.text)}"
+    wrong = f"no line with {len(header)} numbers in the first {len(first.text)}"
     text = f"numbers for {', '.join(header)[:200]}; decimal, delimiter or widths = [...] where blanks do not part them"
-    raise InputError(str(path), found, text)
+    raise InputError(str(path), wrong, text)
 
 
 def _columns_decimal(path: Path, below: Lines, header: list[str], source: Source) -> str:

@@ -130,8 +130,8 @@ def _decoded(path: Path, encoding: str) -> Iterator[str]:
             except UnicodeDecodeError as error:
                 raise InputError(f"{path}, last byte", f"not {marked} text", "text that is not cut short") from error
     except (OSError, EOFError, zlib.error) as error:
-        found = getattr(error, "strerror", None) or str(error)
-        raise InputError(str(path), f"cannot be read: {found}", "a readable file") from error
+        reason = getattr(error, "strerror", None) or str(error)
+        raise InputError(str(path), f"cannot be read: {reason}", "a readable file") from error
 
 
 def blocks(
@@ -158,21 +158,21 @@ def blocks(
             # A lone carriage return at the end may be half of a line end.
             whole = rest + text
             half = "\r" if whole.endswith("\r") else ""
-            found = whole.removesuffix("\r").replace("\r\n", "\n").replace("\r", "\n").split("\n")
-            rest = found.pop() + half
+            lines = whole.removesuffix("\r").replace("\r\n", "\n").replace("\r", "\n").split("\n")
+            rest = lines.pop() + half
         else:
-            found = [rest.removesuffix("\r")] if rest.strip() else []
-            rest, ended = "", not found or rest.endswith("\r")
-        if len(rest) > _LONGEST or any(len(line) > _LONGEST for line in found):
+            lines = [rest.removesuffix("\r")] if rest.strip() else []
+            rest, ended = "", not lines or rest.endswith("\r")
+        if len(rest) > _LONGEST or any(len(line) > _LONGEST for line in lines):
             raise InputError(
                 f"{path}, row {row} or after", f"a line of more than {_LONGEST} characters", "shorter lines"
             )
         kept = [
             (row + i, line)
-            for i, line in enumerate(found)
+            for i, line in enumerate(lines)
             if line.strip(_EMPTY) and not line.lstrip().startswith(comments) and not (leave and leave(line))
         ]
-        row += len(found)
+        row += len(lines)
         if kept:
             yield Lines([r for r, _ in kept], [line for _, line in kept], ended)
 
@@ -218,10 +218,10 @@ class Dialect:
             if '"' in line:
                 # SU2 pads its quoted names with blanks up to the delimiter.
                 line = re.sub(rf'"[ ]+(?={re.escape(self.delimiter)}|$)', '"', line)
-            found = next(csv.reader([line], delimiter=self.delimiter, strict=True, skipinitialspace=True))
+            texts = next(csv.reader([line], delimiter=self.delimiter, strict=True, skipinitialspace=True))
         except csv.Error as error:
             raise InputError(where, f"not a row of cells: {error}", "quotes that are closed in the same row") from error
-        return [cell.strip() for cell in found]
+        return [cell.strip() for cell in texts]
 
     def number(self, cell: str) -> float | None:
         """A cell as a number, or None when it is not a finite one of at most ``LARGEST``."""
@@ -387,8 +387,8 @@ def _one_by_one(
                 value = clock[1].seconds(cells[column])
             if value is None:
                 place = f"{path}, row {row}, column {names[column][:60]}"
-                found = repr(cells[column][:60]) if cells[column] else "nothing"
+                wrong = repr(cells[column][:60]) if cells[column] else "nothing"
                 more = f"seconds, {FORMS}; or rate_hz in [source.reduction] and the column in ignore" if timed else ""
-                raise InputError(place, found, more or f"a finite number of at most {LARGEST:g}{odd(cells[column])}")
+                raise InputError(place, wrong, more or f"a finite number of at most {LARGEST:g}{odd(cells[column])}")
             values[i, j] = value
     return values

@@ -38,18 +38,18 @@ class Clocks:
         time = _TIME.fullmatch(rest)
         if time is None:
             return None
-        found = _of_day(time)
+        of_day = _of_day(time)
         if date is None:
-            if found < self.last - 0.5 * _DAY:
+            if of_day < self.last - 0.5 * _DAY:
                 self.midnights += 1
-            self.last = found
-            return found + _DAY * self.midnights
+            self.last = of_day
+            return of_day + _DAY * self.midnights
         day = _day(date)
         if day is None:
             return None
         if self.day is None:
             self.day = day
-        return found + _DAY * (day - self.day).days
+        return of_day + _DAY * (day - self.day).days
 
 
 def _of_day(time: re.Match[str]) -> float:

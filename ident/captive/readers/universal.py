@@ -32,10 +32,10 @@ def open_universal(path: Path, source: Source) -> Sheet:
     """
     pyuff = needs("pyuff", "readers", path, "a universal file")
     try:
-        found = pyuff.UFF(str(path)).read_sets()
+        stored = pyuff.UFF(str(path)).read_sets()
     except Exception as error:
         raise InputError(str(path), f"not a universal file: {str(error)[:100]}", "a whole file") from error
-    sets = [found] if isinstance(found, dict) else list(found)
+    sets = [stored] if isinstance(stored, dict) else list(stored)
     functions = [one for one in sets if one.get("type") == _FUNCTIONS]
     histories = [one for one in functions if int(one.get("func_type", 0)) in _TIMES]
     if not histories:
