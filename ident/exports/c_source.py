@@ -304,7 +304,7 @@ def _written(boat: Boat, case: Case, db: str, parts: _Parts) -> Source:
         header=header,
         source=source,
         states=tuple(STATES),
-        controls=tuple(said["controls"]),  # type: ignore[arg-type]
+        controls=tuple(said["controls"]),
         commands=tuple(commands),
         start=(parts.state, parts.controls, start),
         step=case.run.step_s,
