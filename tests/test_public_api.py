@@ -125,6 +125,8 @@ def test_results_have_a_table_for_a_notebook(desk, planned):
         page = one._repr_html_()
         assert page.count("<table>") == page.count("</table>") >= 1
         assert "<td>" in page or type(one) is ident.Difference
+    for one in shown[:6]:
+        assert "\n" not in repr(one) and len(repr(one)) < 200, "a line at a prompt"
 
 
 def test_text_from_files_is_escaped_in_a_notebook(desk):

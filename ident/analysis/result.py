@@ -162,6 +162,9 @@ class StabilityMap:
         """``to_dict()`` of every state."""
         return [s.to_dict() for s in self.states]
 
+    def __repr__(self) -> str:
+        return f"StabilityMap({self.title}, version {self.version}: {len(self.states)} states)"
+
     def _repr_html_(self) -> str:
         rows = [["-" if x is None else f"{x:.4g}" for x in row] for row in self.table.itertuples(index=False)]
         return html_table(f"{self.title}, database version {self.version}", _TABLED, rows)

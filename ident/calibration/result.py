@@ -231,6 +231,9 @@ class Calibrated:
         """The calibration for a program to read."""
         return {**self.summary.to_dict(), "version": self.version, "new": self.new, "digest": self.digest}
 
+    def __repr__(self) -> str:
+        return f"Calibrated({self.summary.calibration}: version {self.version})"
+
     def _repr_html_(self) -> str:
         title = f"{self.summary.calibration}: version {self.version}, digest {self.digest[:16]}"
         table = self.groups

@@ -85,6 +85,9 @@ class Campaign:
     members: dict[str, Campaign] = field(default_factory=dict)
     folder: str = ""
 
+    def __repr__(self) -> str:
+        return f"Campaign({self.header.name} of {self.vehicle.name}: {len(self.runs)} runs)"
+
     def _repr_html_(self) -> str:
         groups = self.runs.groupby(["file", "test", "part"], sort=False)
         rows = [(*key, len(g), " ".join(o for o in OUTPUTS if g[o].notna().any())) for key, g in groups]

@@ -55,6 +55,9 @@ class Checked:
         """The findings for a program to read."""
         return {"campaign": self.campaign.header.name, "findings": [f.as_json() for f in self.findings]}
 
+    def __repr__(self) -> str:
+        return f"Checked({self.campaign.header.name}: {', '.join(f'{n} {word}' for word, n in self.counts.items())})"
+
     def _repr_html_(self) -> str:
         header = ("severity", "check", "file", "rows", "what", "remedy")
         rows = [(f.severity, f.check, f.file, f.shown_rows, f.what, f.remedy) for f in self.findings]

@@ -93,6 +93,9 @@ class Fit:
             "between": [asdict(one) for one in self.identification.between],
         }
 
+    def __repr__(self) -> str:
+        return f"Fit({self.campaign.header.name}: version {self.version}, {len(self.rows)} rows)"
+
     def _repr_html_(self) -> str:
         title = f"{self.campaign.header.name}: version {self.version}, digest {self.digest[:16]}"
         table = self.coefficients

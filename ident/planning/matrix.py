@@ -115,6 +115,9 @@ class Plan:
         with whole(Path(path)) as part:
             self.matrix.to_csv(part, index=False)
 
+    def __repr__(self) -> str:
+        return f"Plan({self.campaign.header.name}: {len(self.runs)} states for a relative error of {self.target:g})"
+
     def _repr_html_(self) -> str:
         title = f"{self.campaign.header.name}: {len(self.runs)} states for a relative error of {self.target:g}"
         table = self.matrix

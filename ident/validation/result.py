@@ -232,6 +232,10 @@ class Validation:
             plain |= {"bands": self.band_summary.to_dict(), "coverage": self.coverage}
         return plain
 
+    def __repr__(self) -> str:
+        verdict = "passed" if self.passed else "not passed"
+        return f"Validation({self.case.name} by {self.case.vehicle}, version {self.version}: {verdict})"
+
     def _repr_html_(self) -> str:
         title = f"{self.case.title}, {self.case.vehicle}; {version_words(self.database)}"
         rows = [
