@@ -126,7 +126,8 @@ def test_results_have_a_table_for_a_notebook(desk, planned):
         assert page.count("<table>") == page.count("</table>") >= 1
         assert "<td>" in page or type(one) is ident.Difference
     for one in shown[:6]:
-        assert "\n" not in repr(one) and len(repr(one)) < 200, "a line at a prompt"
+        assert "\n" not in repr(one)
+        assert len(repr(one)) < 200
 
 
 def test_text_from_files_is_escaped_in_a_notebook(desk):
