@@ -116,7 +116,7 @@ def loads(model: Model, motion: Array, depth: float, controls: Array) -> Array:
 
 def steps(vehicle: Vehicle) -> tuple[float, float]:
     """Steps of the central differences: flow angle [rad], and rate times L / U."""
-    return _TABLE_STEPS if vehicle.term_set == "reduced" else _CONSTANT_STEPS
+    return _TABLE_STEPS if vehicle.terms_of.tabulated else _CONSTANT_STEPS
 
 
 def slope(model: Model, vehicle: Vehicle, name: str, speed: float, depth: float, revolutions: float) -> Array:

@@ -59,7 +59,8 @@ class Stability:
     neutral_point_vertical, neutral_point_horizontal : Where a cross force gives no turn,
         x of the neutral point over L, positive ahead of the origin; None as above.
     critical_speed_stern, critical_speed_sail : Speed [m/s] at which the planes no longer
-        change the depth (reversal speed), by group; None when there is none.
+        change the depth (reversal speed), of those aft of the origin and of those ahead; None when
+        there is none.
     vertical, horizontal : Eigenvalues [1/s] of the motion about ``about``, real and imaginary
         part, least stable first; empty when there is no such state, or no added mass of
         that plane of motion.

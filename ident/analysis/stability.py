@@ -112,7 +112,7 @@ def _linear_models(
 ) -> tuple[dict[str, Linear], str]:
     """Linear models, vertical and horizontal, as far as there are any; the state they are about."""
     vehicle = coefficients.vehicle
-    step = _TABLE_STEP if vehicle.term_set == "reduced" else min(steps(vehicle))
+    step = _TABLE_STEP if vehicle.terms_of.tabulated else min(steps(vehicle))
     kept, about = [_VERTICAL, _HORIZONTAL], "self-propulsion"
     if coefficients.get("KT") is None:
         kept, about = [_VERTICAL[1:], _HORIZONTAL], "speed held"
@@ -160,8 +160,8 @@ def stability_at(coefficients: Coefficients, environment: Environment, speed: fl
     stiffness = model.weight * bg / volume
     dynamic = 0.5 * density * length**2 * speed**2
     reversal = {}
-    for group in ("stern", "sail"):
-        planes = [p.name for p in vehicle.planes if p.name.startswith(group)]
+    for group, aft in (("stern", True), ("sail", False)):
+        planes = [p.name for p in vehicle.planes if p.is_aft is aft]
         by_command = _plane_slope(model, vehicle, planes, speed, depth)
         z_d, m_d = by_command[2] / dynamic, by_command[4] / (dynamic * length)
         reversal[group] = critical_speed(stiffness, prime("Z_w"), prime("M_w"), z_d, m_d)

@@ -187,7 +187,7 @@ def check_campaign(
     if campaign.members:
         return _of_several(campaign, folder, identified or identify(campaign), tell)
     evidence = evidence_of(campaign, folder)
-    if campaign.vehicle.term_set != "reduced" and not campaign.runs.empty:
+    if not campaign.vehicle.terms_of.tabulated and not campaign.runs.empty:
         evidence = replace(evidence, derivatives=constants(identified or identify(campaign)))
     return run(evidence, tell)
 

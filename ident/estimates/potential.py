@@ -79,7 +79,7 @@ def unmeasured(draft: Draft) -> str:
         When the version has no added mass of the whole boat, or no such term is missing; and for a set of
         constants, whose authors have said what they leave out.
     """
-    if draft.vehicle.term_set != "reduced":
+    if not draft.vehicle.terms_of.tabulated:
         raise NotApplicable(f"the set {draft.vehicle.term_set} is as its authors give it")
     if draft.vehicle.added_mass == "sections" or not draft.has("Y_vdot"):
         raise NotApplicable("no added mass of the whole boat")

@@ -273,7 +273,7 @@ def _written(boat: Boat, case: Case, db: str, parts: _Parts) -> Source:
 
     name = identifier(boat.vehicle.name)
     steps, every = samples_of(case)
-    rows, columns = steps // every + 1, 15 + parts.controls.size
+    rows, columns = steps // every + 1, maneuver.CONTROLS + parts.controls.size + maneuver.COMMANDED
     translation, names = _translated(parts, rows, columns)
     tanks = parts.controls.size > len(boat.vehicle.planes) + 1
     commands = COMMANDS if tanks else COMMANDS[:3]

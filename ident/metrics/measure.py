@@ -16,6 +16,7 @@ from ident.metrics.metric import Metric, Metrics, Values
 from ident.metrics.turning import SpiralPoint
 from ident.metrics.zigzag import roll_decay, zigzag
 from sim.flight.case import Case
+from sim.flight.maneuver import CONTROLS, STATE
 from sim.flight.series import Series
 from sim.flight.simulate import Simulation
 
@@ -32,7 +33,7 @@ def channels_of(simulation: Simulation) -> Channels:
     if time <= channels["t"][-1] + 1e-9 or not np.isfinite(state).all():
         return channels
     last = {name: values[-1] for name, values in channels.items()} | {"t": time}
-    last |= dict(zip(simulation.columns[1:13], state, strict=True))
+    last |= dict(zip(simulation.columns[STATE:CONTROLS], state, strict=True))
     last["U"] = math.sqrt(float(state[:3] @ state[:3]))
     last["D0"] = last["z"] + simulation.depth_offset
     last["s"] += math.hypot(last["x"] - channels["x"][-1], last["y"] - channels["y"][-1])

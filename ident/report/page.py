@@ -152,7 +152,7 @@ def _signs(coefficients: Coefficients, rows: pd.DataFrame) -> dict[str, Any]:
     """Derivatives at the largest tabulated speed and depth, where most data are."""
     columns = {a: c for c, a in axis_columns().items()}
     speed, depth = (float(rows[columns[a]].max()) for a in ("U", "D0"))
-    if coefficients.vehicle.term_set != "reduced":
+    if not coefficients.vehicle.terms_of.tabulated:
         # Constant coefficients have the same derivatives at every speed and depth.
         speed, depth = 1.0, 0.0
     if speed > 0.0:

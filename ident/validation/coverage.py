@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from sim.boat.catalogue import feature_index
 from sim.boat.coefficients import Coefficient, Coefficients
+from sim.flight.maneuver import COMMANDED, CONTROLS, STATE
 from sim.flight.simulate import Simulation
 from sim.kernel import rhs as kernel
 from sim.kernel.layout import Model, workspace
@@ -36,12 +37,11 @@ class OutsideUse:
 def _features(simulation: Simulation, model: Model) -> Array:
     """(samples, features) of the kernel at evenly spread samples of a record."""
     chosen = np.unique(np.linspace(0, len(simulation.record) - 1, _COVERAGE_SAMPLES).astype(int))
-    # Columns: t, states, controls, the two commands.
     record = np.ascontiguousarray(simulation.record[chosen])
     work = workspace(model)
     features = np.empty((len(chosen), work.features.size))
     for row, sample in zip(features, record, strict=True):
-        kernel.features(model, sample[1:13], sample[13:-2], work)
+        kernel.features(model, sample[STATE:CONTROLS], sample[CONTROLS:-COMMANDED], work)
         row[:] = work.features
     return features
 

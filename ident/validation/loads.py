@@ -21,6 +21,7 @@ from sim.boat.coefficients import Coefficients
 from sim.boat.mass import cross_matrix
 from sim.files.errors import InputError
 from sim.flight.case import Case
+from sim.flight.maneuver import CONTROLS, STATE, TIME
 from sim.flight.simulate import Simulation, begun, environment_of, uses_tanks
 from sim.kernel import rhs as kernel
 from sim.kernel.assemble import assemble
@@ -70,7 +71,8 @@ def loads_by_part(case: Case, boat: Boat, flight: Simulation, by: str = "part") 
     if by not in ("part", "coefficient"):
         raise ValueError(f"by {by!r}: part or coefficient")
     record = np.ascontiguousarray(flight.record)
-    states, controls = record[:, 1:13], record[:, 13 : 13 + len(boat.vehicle.planes) + 1]
+    states = record[:, STATE:CONTROLS]
+    controls = record[:, CONTROLS : CONTROLS + len(boat.vehicle.planes) + 1]
     by_source: dict[str, Array] = {}
     # Thrust needs thrust deduction and wake, which are rows of the propeller, whatever is asked.
     sections = {s.name for s in boat.vehicle.sections.centres} if boat.vehicle.sections else set()
@@ -84,9 +86,8 @@ def loads_by_part(case: Case, boat: Boat, flight: Simulation, by: str = "part") 
     if flight.waves is not None:
         by_source[WAVES] = -total
     units = [f"{o}_{'N' if o in 'XYZ' else 'Nm'}" for o in OUTPUTS]
-    tables = [
-        pd.DataFrame(values, columns=units).assign(t_s=record[:, 0], source=name) for name, values in by_source.items()
-    ]
+    time = record[:, TIME]
+    tables = [pd.DataFrame(v, columns=units).assign(t_s=time, source=name) for name, v in by_source.items()]
     return pd.concat(tables, ignore_index=True)[["t_s", "source", *units]]
 
 

@@ -16,6 +16,7 @@ from sim.bench.loops import rates, steps
 from sim.boat.coefficients import Coefficients
 from sim.boat.mass import Environment
 from sim.flight.case import Case, load_case
+from sim.flight.maneuver import CONTROLS, STATE
 from sim.flight.plant import Plant
 from sim.flight.simulate import environment_of, fly, samples_of, simulate
 from sim.kernel import plain
@@ -47,10 +48,12 @@ def _step_apart(case: Case, coefficients: Coefficients, model: Model) -> tuple[n
     """States a step apart along a flight, near the surface, so that sums meet the boat where they expect it."""
     flown = simulate(case, coefficients)
     clock = np.arange(0.0, flown["t"][-1], case.run.step_s)
-    states = np.stack([np.interp(clock, flown["t"], flown.record[:, k]) for k in range(1, 13)], axis=1)
+    states = np.stack([np.interp(clock, flown["t"], flown.record[:, k]) for k in range(STATE, CONTROLS)], axis=1)
     states[:, 8] += DEPTH - states[0, 8] - model.sail_top
     planes = len(coefficients.vehicle.planes)
-    controls = np.stack([np.interp(clock, flown["t"], flown.record[:, 13 + k]) for k in range(planes + 1)], axis=1)
+    controls = np.stack(
+        [np.interp(clock, flown["t"], flown.record[:, CONTROLS + k]) for k in range(planes + 1)], axis=1
+    )
     return states, controls
 
 

@@ -21,7 +21,6 @@ from sim.files.errors import InputError
 OUTPUTS = ("X", "Y", "Z", "K", "M", "N")
 # The state in its order: velocities in the body frame, position and angles in the earth frame.
 STATES = ("u", "v", "w", "p", "q", "r", "x", "y", "z", "phi", "theta", "psi")
-SETS = ("reduced", "gertler_hagen", "mmg", "auv", "nps_auv")
 # Extrapolation rules of an axis; ``sim.boat.tables`` implements them.
 RULES = {
     "hold": "the value at the last point",
@@ -53,6 +52,41 @@ ACCELERATIONS = ("udot", "vdot", "wdot", "pdot", "qdot", "rdot")
 
 class CatalogueError(ValueError):
     """A row of the term table contradicts itself."""
+
+
+@dataclass(frozen=True)
+class TermSet:
+    """What holds for all terms of a set.
+
+    Attributes
+    ----------
+    name : As a vehicle file states it.
+    tabulated : Whether coefficients are tables over speed, angles and depth: derivatives then depend on them.
+    constant : Whether the axes of its rows are dropped but for those of propulsion.
+    rudder : Whether loads of a rudder come from its size and the propeller's wash.
+    meaning, source : For people.
+    """
+
+    name: str
+    tabulated: bool
+    constant: bool
+    rudder: bool
+    meaning: str
+    source: str
+
+
+@cache
+def term_sets() -> dict[str, TermSet]:
+    """All term sets by name, from ``data/term_sets.csv``."""
+    rows = csv.DictReader((files("sim") / "data" / "term_sets.csv").read_text("utf-8").splitlines())
+    flags = ("tabulated", "constant", "rudder")
+    return {
+        r["name"]: TermSet(r["name"], *(r[flag] == "yes" for flag in flags), meaning=r["meaning"], source=r["source"])
+        for r in rows
+    }
+
+
+SETS = tuple(term_sets())
 
 
 @dataclass(frozen=True)
@@ -197,7 +231,8 @@ def check(term: Term) -> None:
     problems += [f"rule {r!r}" for r in term.extrapolation.values() if r not in RULES]
     if set(term.extrapolation) != set(term.axes):
         problems.append("an extrapolation rule for each axis and no other")
-    if not term.part.startswith(("stern_plane", "sail_plane")):
+    # The angle of a plane is mirrored to that of its image, ``sim.boat.parts``.
+    if "delta" not in term.axes:
         turned = {a: term.mirror_sign() for a in term.axes if a in axes() and axes()[a].mirror < 0}
         if turned != term.parity:
             problems.append(f"parity {term.parity}, the mirror gives {turned}")
@@ -232,7 +267,7 @@ def terms(term_set: str = "reduced") -> tuple[Term, ...]:
         raise CatalogueError(f"term table: a name stands twice in the set {term_set!r}")
     for term in chosen:
         check(term)
-    if term_set in ("gertler_hagen", "auv", "nps_auv"):
+    if term_sets()[term_set].constant:
         chosen = [t if t.group == "propulsion" else replace(t, axes=(), parity={}, extrapolation={}) for t in chosen]
     return tuple(chosen)
 

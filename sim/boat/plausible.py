@@ -85,7 +85,7 @@ def _faults(vehicle: Any) -> Iterator[tuple[str, str, str]]:
     yield from _places(vehicle)
     for plane in vehicle.planes:
         yield from _plane(plane, vehicle)
-    if vehicle.rudder is not None and (vehicle.term_set != "mmg" or "rudder" not in [p.name for p in vehicle.planes]):
+    if vehicle.rudder is not None and (not vehicle.terms_of.rudder or "rudder" not in [p.name for p in vehicle.planes]):
         yield "rudder", "the size of a rudder", 'term_set = "mmg" and a plane named rudder: nothing else uses it'
 
 

@@ -9,6 +9,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import Field, field_validator
 
+from sim.boat.catalogue import TermSet, term_sets
 from sim.boat.plausible import check_vehicle
 from sim.boat.stated import Length, Limits, Mass, Number, Place, Vector, in_unit
 from sim.files.errors import InputError
@@ -113,6 +114,11 @@ class Plane(Data):
     limit_deg: Annotated[float, Field(gt=0)]
     rate_degps: Annotated[float, Field(gt=0)]
     source: str
+
+    @property
+    def is_aft(self) -> bool:
+        """Whether it stands aft of the body origin, in the program frame."""
+        return self.position[0] < 0.0
 
     @property
     def lift_axis(self) -> np.ndarray:
@@ -280,6 +286,11 @@ class Vehicle(Data):
         for section in (data["sections"] or {"centres": []})["centres"]:
             section["position"] = turn(section["position"])
         return Vehicle.model_validate(data)
+
+    @property
+    def terms_of(self) -> TermSet:
+        """What holds for all terms of its set."""
+        return term_sets()[self.term_set]
 
     def part_names(self) -> list[str]:
         """Every part of the boat that a run may carry loads of."""

@@ -45,8 +45,9 @@ from sim.waves.surroundings import near_of, prepare, read_gauge
 
 Array = NDArray[np.float64]
 
-# Columns of a record: time, states, controls, two commands.
+# Columns of a record: time, states, controls, and as many commands of planes at the end.
 TIME, STATE, CONTROLS = 0, 1, 1 + N_STATES
+COMMANDED = 2
 # Zigzag executes and ended steps that a flight leaves room for at first.
 _EVENTS = 256
 # Time [s] to which an event is located.
@@ -318,7 +319,7 @@ def hold(v: Flight, around: Around, rate: np.ndarray, dt: float, steps: int, sta
 class Flown(NamedTuple):
     """What a run leaves.
 
-    record : (rows, 15 + controls) as in ``run``, up to the last finite row.
+    record : (rows, ``CONTROLS`` + controls + ``COMMANDED``) as in ``run``, up to the last finite row.
     executes : (k, 2) time [s] and command [rad] of each zigzag execute.
     log : (k, 3) time [s], axis and number of each step of a programme that ended.
     end : (13,) time [s] and state at the end of the run.
@@ -347,7 +348,7 @@ def fly_logged(
     ----------
     room : Executes and ended steps there is room for at first; with more, it is flown once more.
     """
-    record = np.zeros((steps // every + 1, CONTROLS + c0.size + 2))
+    record = np.zeros((steps // every + 1, CONTROLS + c0.size + COMMANDED))
     work = workspace(model, around)
     while True:
         log = Log(record, np.zeros((room, 2)), np.zeros((room, 3)))
