@@ -32,7 +32,7 @@ if os.environ.get("CI"):
 
 
 # Files that take minutes begin first: a file is one worker's, and the last to begin is waited for.
-LONGEST = ("test_whatever_is_declared_counts",)
+LONGEST = ("test_whatever_a_source_declares_counts", "test_whatever_a_campaign_declares_counts")
 
 
 def pytest_collection_modifyitems(items):

@@ -1,0 +1,167 @@
+"""Every key of ``[[source]]``: changing it changes the result, or is refused; what is unused says why.
+
+The keys are taken from the schemas, so a new one without a case here fails.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from declared_campaigns import (
+    DRIFT,
+    HEAD,
+    LOADS,
+    ROWS,
+    differs,
+    keys,
+    of,
+    outcome,
+    primes,
+    reduced,
+    sway,
+)
+
+from ident.captive import source
+
+SWAY: dict[str, Any] = {
+    "files": "sway.csv",
+    "rows": "history",
+    "constants": {"part": "hull", "quality": "ok", "U": "5 m/s", "alpha": "0 deg", "beta": "0 deg", "D0": "25 m"},
+    "reduction": {"kind": "oscillatory", "motion": "sway", "frequency_hz": 0.25, "amplitude": 0.3},
+}
+STEADY = {**SWAY, "constants": {**SWAY["constants"], "test": "drift_horizontal", "beta": "4 deg"}}
+STEADY["reduction"] = {"kind": "steady"}
+GRIDS = {"finest": "fine", "coarser": ["mid", "low"], "refinement": 1.4}
+RATES = {k: v for k, v in SWAY["reduction"].items() if k != "amplitude"}
+
+
+SEMI = ROWS.replace(",", ";")
+PART = ROWS.replace(LOADS, LOADS + ",RX [N],RY [N]").replace("\na", "\na").replace("-17000,0\n", "-17000,0,5,50\n")
+PART = PART.replace("-2260000\n", "-2260000,6,60\n").replace("-4500000\n", "-4500000,7,70\n")
+TAKEN = {"what": "rudder", "source": "stock", "columns": {"RX": "X", "RY": "Y"}, "at_m": [-30.0, 0.0, 0.0]}
+SOURCE_CASES: dict[str, tuple[dict[str, Any], dict[str, Any], dict[str, Any]]] = {
+    "Source.files": (of(DRIFT), of(DRIFT, files="none.csv"), {}),
+    "Source.reader": (of(DRIFT), of(DRIFT, reader="columns"), {}),
+    "Source.rows": (of(DRIFT), of(DRIFT, rows="history"), {}),
+    "Source.columns": (of(DRIFT), of(DRIFT, columns={"X_N": "Y [N]"}), {}),
+    "Source.patterns": (of(DRIFT), of(DRIFT, patterns={"^X": "X"}), {}),
+    "Source.ignore": (of(DRIFT), of(DRIFT, ignore=["X*"]), {}),
+    "Source.table": (of(DRIFT), of(DRIFT, table="drift"), {}),
+    "Source.names": (of(DRIFT), of(DRIFT, names=["a", "b"]), {}),
+    "Source.header_pattern": (of(DRIFT), of(DRIFT, header_pattern="^a", delimiter=","), {}),
+    "Source.widths": (of(DRIFT), of(DRIFT, widths=[3, 3]), {}),
+    "Source.units_row": (of(DRIFT), of(DRIFT, units_row=True), {}),
+    "Source.delimiter": (of(DRIFT), of(DRIFT, delimiter=";"), {}),
+    "Source.decimal": (of(DRIFT), of(DRIFT, decimal=","), {}),
+    "Source.thousands": (of(DRIFT), of(DRIFT, thousands="."), {}),
+    "Source.encoding": (of(DRIFT), of(DRIFT, encoding="utf-16-le"), {}),
+    "Source.skip": (of(DRIFT), of(DRIFT, skip="^b"), {}),
+    "Source.constants": (of(DRIFT), of(DRIFT, constants={**DRIFT["constants"], "quality": "poor"}), {}),
+    "Source.within": (of(DRIFT), of(DRIFT, within={"beta_deg": [-5.0, 5.0]}), {}),
+    "Source.match": (of(DRIFT), of(DRIFT, match="(?P<reason>x)"), {}),
+    "Source.normalisation": (of(DRIFT), of(DRIFT, normalisation="half_rho_L2"), {}),
+    "Source.parts": (of(DRIFT), of(DRIFT, parts={"a": "hull"}), {}),
+    "Source.rho_inf": (of(DRIFT), of(DRIFT, rho_inf=1.0), {}),
+    "Source.vehicle_origin": (of(DRIFT), of(DRIFT, vehicle_origin=[1.0, 0.0, 0.0]), {}),
+    "Source.cofr": (of(DRIFT), of(DRIFT, cofr=[1.0, 0.0, 0.0]), {}),
+    "Source.axes": (of(DRIFT), of(DRIFT, axes="flow"), {}),
+    "Source.moments_about": (of(SWAY), of(SWAY, moments_about="fixed"), {"files": {"sway.csv": sway()}}),
+    "Source.factor": (of(DRIFT), of(DRIFT, factor={"Y": -1.0}), {}),
+    "Source.missing": (of(DRIFT), of(DRIFT, missing=[-629000.0]), {}),
+    "Source.words": (of(DRIFT), of(DRIFT, words={"rudder": "towing"}), {}),
+    "Source.plus_minus": (
+        of(DRIFT),
+        of(DRIFT, plus_minus=1.96),
+        {"files": {"drift.csv": ROWS.replace("-336000,", "-336000 \u00b1 5000,")}},
+    ),
+    "Source.marks": (
+        of(DRIFT),
+        of(DRIFT, marks={"*": "poor"}),
+        {"files": {"drift.csv": ROWS.replace("-336000,", "-336000*,")}},
+    ),
+    "Source.reference": (of(DRIFT), of(DRIFT, reference={"area_m2": 1.0, "source": "x"}), {}),
+    "Source.reduction": (of(DRIFT), of(DRIFT, reduction={"kind": "steady"}), {}),
+    "Source.subtract": (of(DRIFT, ignore=["R*"]), of(DRIFT, subtract=[TAKEN]), {"files": {"drift.csv": PART}}),
+    "Subtract.what": (
+        of(DRIFT, subtract=[TAKEN]),
+        of(DRIFT, subtract=[{**TAKEN, "what": "skeg"}]),
+        {"files": {"drift.csv": PART}, "words": True},
+    ),
+    "Subtract.source": (
+        of(DRIFT, subtract=[TAKEN]),
+        of(DRIFT, subtract=[{**TAKEN, "source": "other"}]),
+        {"files": {"drift.csv": PART}, "words": True},
+    ),
+    "Subtract.columns": (
+        of(DRIFT, subtract=[TAKEN]),
+        of(DRIFT, subtract=[{**TAKEN, "columns": {"RX": "Y", "RY": "X"}}]),
+        {"files": {"drift.csv": PART}},
+    ),
+    "Subtract.at_m": (
+        of(DRIFT, subtract=[TAKEN]),
+        of(DRIFT, subtract=[{**TAKEN, "at_m": [-10.0, 0.0, 0.0]}]),
+        {"files": {"drift.csv": PART}},
+    ),
+    "Subtract.factor": (
+        of(DRIFT, subtract=[TAKEN]),
+        of(DRIFT, subtract=[{**TAKEN, "factor": 20.0}]),
+        {"files": {"drift.csv": PART}},
+    ),
+    "Source.grids": (
+        of({**STEADY, "files": "fine/sway.csv"}),
+        of(
+            {**STEADY, "files": "fine/sway.csv"}, grids={"finest": "fine", "coarser": ["mid", "low"], "refinement": 1.4}
+        ),
+        {"files": {f"{grid}/sway.csv": sway(lag) for grid, lag in (("fine", 0.0), ("mid", 0.05), ("low", 0.15))}},
+    ),
+    "Source.deduction": (
+        of(STEADY),
+        of(STEADY, deduction={"towed": "towed.csv", "thrust_n": 5e4, "source": "disc"}),
+        {"files": {"sway.csv": sway(), "towed.csv": sway(0.1)}},
+    ),
+    # A file that is to come is waited for; without the key it is refused.
+    "Source.awaited": (
+        {**HEAD, "source": [DRIFT, {**DRIFT, "files": "late.csv", "awaited": True}]},
+        {**HEAD, "source": [DRIFT, {**DRIFT, "files": "late.csv"}]},
+        {},
+    ),
+    "Reduction.kind": (of(STEADY), reduced(STEADY, kind="acceleration"), {"files": {"sway.csv": sway()}}),
+    "Reduction.start_s": (of(SWAY), reduced(SWAY, start_s=40.0), {"files": {"sway.csv": sway()}}),
+    "Reduction.end_s": (of(SWAY), reduced(SWAY, end_s=50.0), {"files": {"sway.csv": sway()}}),
+    "Reduction.rate_hz": (of(SWAY), reduced(SWAY, rate_hz=11.0), {"files": {"sway.csv": sway()}}),
+    "Reduction.motion": (of(SWAY), reduced(SWAY, motion="heave"), {"files": {"sway.csv": sway()}}),
+    "Reduction.frequency_hz": (of(SWAY), reduced(SWAY, frequency_hz=0.2), {"files": {"sway.csv": sway()}}),
+    "Reduction.amplitude": (of(SWAY), reduced(SWAY, amplitude=0.4), {"files": {"sway.csv": sway()}}),
+    "Reduction.phase_deg": (of(SWAY), reduced(SWAY, phase_deg=30.0), {"files": {"sway.csv": sway()}}),
+    "Reduction.delay_s": (of(SWAY), reduced(SWAY, delay_s={"Y": 0.05}), {"files": {"sway.csv": sway()}}),
+}
+PRIMED = {"drift.csv": primes(ROWS)}
+REFERENCE = {"area_m2": 40.0, "length_m": 4.0, "source": "setup"}
+SOURCE_CASES |= {
+    f"Reference.{k}": (
+        of(DRIFT, normalisation="half_rho_A", reference=REFERENCE),
+        of(DRIFT, normalisation="half_rho_A", reference={**REFERENCE, k: v}),
+        {"files": PRIMED, "words": k == "source"},
+    )
+    for k, v in {"area_m2": 80.0, "length_m": 8.0, "source": "other"}.items()
+}
+SOURCE_KEYS = keys(source, ("Source", "Reduction", "Reference", "Subtract"))
+
+
+@pytest.mark.parametrize("key", SOURCE_KEYS)
+def test_every_key_of_a_source_counts(tmp_path, key):
+    before, after, how = SOURCE_CASES[key]
+    differs(tmp_path, before, after, how.get("files"), words=how.get("words", False))
+
+
+def test_what_is_declared_and_unused_names_file_key_and_reason(tmp_path):
+    for own, words in (
+        (of(DRIFT, normalisation="half_rho_L2"), ("campaign.toml", "source.normalisation", "nothing is made")),
+        (of(DRIFT, ignore=["Cd"]), ("campaign.toml", "source.ignore", "no column of the files fits it")),
+        (of(DRIFT, factor={"Q": 2.0}), ("campaign.toml", "source.factor", "has this name")),
+        (of(DRIFT, words={"a b": "towing"}), ("campaign.toml", "source.words", "no text column")),
+        (of(DRIFT, rho_inf=1.0), ("campaign.toml", "source.rho_inf", "does not look at it")),
+    ):
+        found = outcome(tmp_path, own, {"drift.csv": ROWS})
+        assert all(w in found["refused"] for w in words), found
