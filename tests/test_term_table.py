@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 from dataclasses import replace
 from importlib.resources import files
+from typing import get_args
 
 import numpy as np
 import pandas as pd
@@ -17,7 +18,7 @@ from sim.boat.database import axis_columns
 from sim.boat.forces import boat_features, multiplier, plane_features, slipstream
 from sim.boat.mass import Environment, added_mass_matrix
 from sim.boat.parts import mirror_of, parts_of, vehicle_terms
-from sim.boat.vehicle import load_vehicle
+from sim.boat.vehicle import Vehicle, load_vehicle
 from sim.kernel import rhs as kernel
 from sim.kernel.assemble import assemble
 from sim.kernel.layout import workspace
@@ -246,3 +247,7 @@ def test_unknown_set_and_unknown_term_are_refused():
         catalogue.terms("feldman")
     with pytest.raises(CatalogueError, match="no term"):
         catalogue.term("Y_uuu")
+
+
+def test_a_vehicle_file_may_state_every_set_of_the_table_and_no_other():
+    assert get_args(Vehicle.model_fields["term_set"].annotation) == SETS
