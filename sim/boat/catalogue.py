@@ -79,10 +79,16 @@ class TermSet:
 def term_sets() -> dict[str, TermSet]:
     """All term sets by name, from ``data/term_sets.csv``."""
     rows = csv.DictReader((files("sim") / "data" / "term_sets.csv").read_text("utf-8").splitlines())
-    flags = ("tabulated", "constant", "rudder")
     return {
-        r["name"]: TermSet(r["name"], *(r[flag] == "yes" for flag in flags), meaning=r["meaning"], source=r["source"])
-        for r in rows
+        row["name"]: TermSet(
+            name=row["name"],
+            tabulated=row["tabulated"] == "yes",
+            constant=row["constant"] == "yes",
+            rudder=row["rudder"] == "yes",
+            meaning=row["meaning"],
+            source=row["source"],
+        )
+        for row in rows
     }
 
 
