@@ -218,6 +218,9 @@ class DatabaseVersion:
             return ""
         return named
 
+    def __repr__(self) -> str:
+        return f"DatabaseVersion({self.path}: version {self.number})"
+
     def _repr_html_(self) -> str:
         title = f"version {self.number} of {self.path}: {len(self.rows)} values of {', '.join(self.vehicles)}"
         groups = self.rows.groupby(["vehicle", "coefficient"], sort=False)
