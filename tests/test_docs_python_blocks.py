@@ -65,9 +65,9 @@ def test_the_plant_of_the_page_turns_to_its_heading(desk):
 
 
 def test_the_right_hand_side_of_the_page_stays_at_its_equilibrium(desk):
-    (block,) = _blocks("docs/architecture.md", "## The right-hand side")
+    (block,) = _blocks("docs/right-hand-side.md")
     names: dict[str, object] = {}
-    exec(compile(block, "docs/architecture.md", "exec"), names)
+    exec(compile(block, "docs/right-hand-side.md", "exec"), names)
     flown, trim = names["flown"], names["trim"]
     assert flown.success
     np.testing.assert_allclose(flown.y[:6, -1], trim.state[:6], atol=1e-3)
