@@ -29,10 +29,8 @@ def desk(tmp_path_factory):
         yield folder
 
 
-def _blocks(name, heading=""):
-    text = (ROOT / name).read_text("utf-8")
-    text = text[text.index(heading) :]
-    return re.findall(r"```python\n(.*?)```", text, re.DOTALL)
+def _blocks(name):
+    return re.findall(r"```python\n(.*?)```", (ROOT / name).read_text("utf-8"), re.DOTALL)
 
 
 def test_the_six_things_run_as_they_stand(desk):
