@@ -88,7 +88,7 @@ def read_surface(path: Path, template: Template, vehicle: Vehicle, where: str) -
         For a file that is no surface, a patch that is missing or belongs to no part, a surface that is open or
         inverted, a unit or a number beyond its tolerance of the vehicle file.
     """
-    raw = _read(path)
+    raw = read_patches(path)
     _named(path, set(raw), template, vehicle, where)
     own = template.surface
     signs = np.array([own.frame.signs[a] for a in "xyz"], dtype=float)
@@ -103,7 +103,7 @@ def read_surface(path: Path, template: Template, vehicle: Vehicle, where: str) -
         for name, (vertices, triangles) in raw.items()
     }
     _right_unit(path, patches, template, vehicle, where)
-    body, members = _closed(path, patches)
+    body, members = closed_bodies(path, patches)
     lines = Lines(patches, body, members)
     lines = Lines(patches, body, members, tuple(_numbers(lines, template, vehicle)))
     for one in lines.checks:
@@ -114,7 +114,7 @@ def read_surface(path: Path, template: Template, vehicle: Vehicle, where: str) -
     return lines
 
 
-def _read(path: Path) -> dict[str, tuple[Array, NDArray[np.int64]]]:
+def read_patches(path: Path) -> dict[str, tuple[Array, NDArray[np.int64]]]:
     """Patch -> vertices as written and triangles, equal vertices merged."""
     trimesh = library("trimesh", "cfd", "surface")
     paths = sorted(path.glob("*.stl")) if path.is_dir() else [path]
@@ -188,7 +188,7 @@ def _right_unit(path: Path, patches: dict[str, Mesh], template: Template, vehicl
     raise InputError(f"{path}, by {where}, key surface.unit", what, text)
 
 
-def _closed(path: Path, patches: dict[str, Mesh]) -> tuple[Mesh, tuple[frozenset[str], ...]]:
+def closed_bodies(path: Path, patches: dict[str, Mesh]) -> tuple[Mesh, tuple[frozenset[str], ...]]:
     """All patches as closed bodies, pieces that share edges together, with the patches of each."""
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components

@@ -42,3 +42,43 @@ def schema(kind: str, json_path: str | None) -> None:
     import ident
 
     emit(ident.schema(kind), json_path or "-")
+
+
+@click.command()
+@click.argument("surface", type=click.Path(path_type=Path))
+@click.option("--unit", type=click.Choice(["m", "mm", "cm", "in", "ft"]), required=True, help="Of the surface.")
+@click.option(
+    "--length", type=click.FloatRange(0, 1e4, min_open=True), required=True, help="Over all [m]; checks the unit."
+)
+@click.option("--x", type=click.Choice(["aft", "forward"]), default="aft", show_default=True, help="Where x points.")
+@click.option("--z", type=click.Choice(["up", "down"]), default="up", show_default=True, help="Where z points.")
+@click.option("--axis", type=float, default=0.0, show_default=True, help="z of the hull's axis, in the unit.")
+@click.option(
+    "--out", type=click.Path(path_type=Path), required=True, help="Folder for hull.toml and hull_offsets.csv."
+)
+@json_to("Write the offsets as JSON.")
+def offsets(
+    surface: Path, unit: str, length: float, x: str, z: str, axis: float, out: Path, json_path: str | None
+) -> None:
+    """Take polar offsets of a hull from an STL file and write its geometry file.
+
+    The surface is the hull alone: closed, its triangles seen from the water counter-clockwise, as long as --length. A
+    vehicle file names what is written by geometry = "hull.toml"; a campaign of it without runs is then
+    fitted from its lines (docs/your-own-boat.md). Needs the extra cfd.
+
+    \b
+    Example: ident offsets hull.stl --unit mm --length 70.2 --out my-boat
+    """
+    import math
+
+    from ident.cfd.offsets import offsets_of
+
+    if not math.isfinite(axis):
+        raise click.UsageError("--axis is a finite number")
+    found = offsets_of(surface, unit, length, x == "forward", z == "up", axis)
+    written = found.write(out)
+    if json_path != "-":
+        click.echo("\n".join(path.as_posix() for path in written))
+        click.echo(f"volume {found.volume:.5g} m3, of the surface {found.surface_volume:.5g} m3")
+    if json_path:
+        emit(found.to_dict() | {"files": [path.as_posix() for path in written]}, json_path)
