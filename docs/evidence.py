@@ -10,7 +10,7 @@ from reference_tables import table
 import ident
 from ident.captive.campaign import read_campaign
 from ident.database.store import database_rows
-from ident.estimates.appendages import differences, read_appendages
+from ident.estimates.appendages import differences
 from ident.identification.identify import identify
 from ident.validation.validate import Validation
 from sim.boat.vehicle import load_vehicle
@@ -55,12 +55,10 @@ def vehicles() -> str:
 
 
 def suboff_differences() -> str:
-    """What an appendage adds alone: estimated from its size, and measured."""
+    """What an appendage adds alone: by the lines, and measured."""
     folder = DATA / "suboff" / "configurations"
     rows = {n: database_rows(identify(read_campaign(folder / n))) for n in ("hull", "hull-sail", "hull-planes")}
-    found = differences(
-        read_appendages(folder / "appendages.csv"), rows, load_vehicle("suboff").particulars.length.value
-    )
+    found = differences(rows, "suboff")
     inside = sum(abs(d.score) < 1.96 for d in found)
     lines = [
         [
