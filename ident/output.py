@@ -16,6 +16,8 @@ from html import escape
 from pathlib import Path
 from typing import Any, TypeVar
 
+from sim.files.mirror import is_alive
+
 T = TypeVar("T")
 
 # Told of long work as it goes on: what is being done, how much of it is done, and of how much.
@@ -124,19 +126,6 @@ def _remove_left(path: Path) -> None:
         if number.isdecimal() and not is_alive(int(number)):
             with contextlib.suppress(OSError):
                 left.unlink()
-
-
-def is_alive(process: int) -> bool:
-    """Whether a process of this machine runs; where that cannot be asked, it is taken to."""
-    if os.name != "posix":
-        return True
-    try:
-        os.kill(process, 0)
-    except ProcessLookupError:
-        return False
-    except (OSError, OverflowError):
-        return True
-    return True
 
 
 def _begin(part: Path, like: Path) -> None:

@@ -147,12 +147,13 @@ def reading(path: Path) -> list[object]:
 
 
 def test_every_byte_of_a_version_turned_is_refused_or_changes_nothing(db):
-    """Data files, log and note; a sample of their bytes, each turned to a random other value."""
+    """Data files, log and note; a sample of their bytes (``IDENT_BYTES=500``), each turned to a random other value."""
     expected = reading(db)
     files = [p for p in db.rglob("*") if p.is_file()]
     chance = random.Random(24)
     outcome = {"refused": 0, "equal": 0}
-    for file in chance.choices(files, [p.stat().st_size for p in files], k=60):
+    count = int(os.environ.get("IDENT_BYTES", "60"))
+    for file in chance.choices(files, [p.stat().st_size for p in files], k=count):
         content = file.read_bytes()
         turned = bytearray(content)
         turned[chance.randrange(len(turned))] ^= chance.randrange(1, 256)
@@ -163,7 +164,8 @@ def test_every_byte_of_a_version_turned_is_refused_or_changes_nothing(db):
         except InputError:
             outcome["refused"] += 1
         file.write_bytes(content)
-    assert outcome["refused"] > 20
+    print(outcome)
+    assert outcome["refused"] > count / 3
     assert reading(db) == expected
 
 

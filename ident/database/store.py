@@ -35,7 +35,7 @@ from sim.boat.delta_log import LATEST, LOG, Entry, Log, has_versions, latest_sai
 from sim.boat.parts import Point, parts_of, vehicle_terms
 from sim.boat.row_codec import correlation_texts
 from sim.files.errors import InputError
-from sim.files.storage import address, brief, engine, flush, is_url
+from sim.files.storage import address, brief, engine, flush, is_url, written_to
 
 # Delta Lake's own housekeeping would delete the log of old versions, and then their data.
 FOR_EVER = {
@@ -260,13 +260,14 @@ def _written(path: str, rows: pd.DataFrame, said: dict[str, str], how: dict[str,
     with engine(path, "the version cannot be written", "room, and a path you may write to"):
         try:
             # Never tried again on top of what another wrote meanwhile: what it replaces would be another's.
-            write_deltalake(
-                address(path),
-                arrow(rows),
-                commit_properties=CommitProperties(custom_metadata=said, max_commit_retries=0),
-                post_commithook_properties=PostCommitHookProperties(cleanup_expired_logs=False),
-                **how,
-            )
+            with written_to(path) as place:
+                write_deltalake(
+                    place,
+                    arrow(rows),
+                    commit_properties=CommitProperties(custom_metadata=said, max_commit_retries=0),
+                    post_commithook_properties=PostCommitHookProperties(cleanup_expired_logs=False),
+                    **how,
+                )
         except CommitFailedError as error:
             if last_try:
                 raise InputError(
@@ -283,7 +284,7 @@ def _written(path: str, rows: pd.DataFrame, said: dict[str, str], how: dict[str,
 
 def _kept_for_ever(log: Log) -> Log:
     """A table that was made before versions were kept for ever is told to keep them."""
-    from deltalake import CommitProperties
+    from deltalake import CommitProperties, DeltaTable
 
     table = open_table(log.path, log.last, log)
     with engine(log.path, "cannot be changed", "a database you may write to"):
@@ -296,7 +297,8 @@ def _kept_for_ever(log: Log) -> Log:
         }
         said["seal"] = seal(said)
         never_again = CommitProperties(custom_metadata=said, max_commit_retries=0)
-        table.alter.set_table_properties(FOR_EVER, commit_properties=never_again)
+        with written_to(log.path) as place:
+            DeltaTable(place, version=log.last).alter.set_table_properties(FOR_EVER, commit_properties=never_again)
     return Log(log.path)
 
 

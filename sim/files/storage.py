@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from sim.files.errors import InputError
+from sim.files.mirror import handed_over, mirrored
 
 
 def is_url(path: str) -> bool:
@@ -24,20 +25,62 @@ _MISREAD = re.compile(r"[\[\]\\^|\x00-\x1f\x7f\ud800-\udfff]|%[0-9A-Fa-f]{2}")
 def address(path: str) -> str:
     """Address of a database for the storage engine: a URL, in which ``#``, ``?`` and blanks are themselves.
 
+    A folder whose name the engine misreads is read by its mirror (``sim.files.mirror``), as it is at this
+    moment; to write, see ``written_to``.
+
     Raises
     ------
     InputError
-        For a folder whose name the engine would read as another's.
+        For such a folder where no mirror can be made.
     """
     if is_url(path):
         return path
     # Links are followed by the engine too.
     real = Path(os.path.realpath(path))
-    found = _MISREAD.search(real.as_posix())
-    if found:
-        text = f"{found[0]!r} in the name of a folder, which the storage engine reads as something else"
-        raise InputError(path, text, "a database in a folder named without [ ] | ^ \\ and %20")
-    return real.as_uri()
+    if not _MISREAD.search(real.as_posix()):
+        return real.as_uri()
+    with _mirror(path):
+        return _read(mirrored(real)).as_uri()
+
+
+@contextlib.contextmanager
+def written_to(path: str) -> Iterator[str]:
+    """Address of a database for the storage engine to write to; what it wrote is there at the end.
+
+    Hold the lock of a folder.
+
+    Raises
+    ------
+    InputError
+        As ``address``.
+    OSError
+        When what was written cannot be handed to the database, as when another writer was faster.
+    """
+    real = Path(path if is_url(path) else os.path.realpath(path))
+    if is_url(path) or not _MISREAD.search(real.as_posix()):
+        yield address(path)
+        return
+    with contextlib.ExitStack() as stack:
+        with _mirror(path):
+            place = _read(stack.enter_context(handed_over(real))).as_uri()
+        yield place
+
+
+def _read(mirror: Path) -> Path:
+    if _MISREAD.search(mirror.as_posix()):
+        raise OSError(f"the folder for temporary files is misread too, {mirror.parent}")
+    return mirror
+
+
+@contextlib.contextmanager
+def _mirror(path: str) -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        text = f"a name that the storage engine misreads, and no mirror of the folder: {error}"
+        raise InputError(
+            path, text, "room for temporary files, or a folder named without [ ] | ^ \\ and %20"
+        ) from error
 
 
 def brief(error: BaseException) -> str:
