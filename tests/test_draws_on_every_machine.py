@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import platform
 import subprocess
 import sys
 from pathlib import Path
@@ -14,6 +13,7 @@ import pytest
 from hypothesis import given
 from hypothesis import settings as given_settings
 from hypothesis import strategies as st
+from kernels_of_linear_algebra import kernels, threads
 
 from ident.validation.band_summary import variance_shares
 from ident.validation.bands import Bands
@@ -21,14 +21,6 @@ from ident.validation.draws import draw, factor, scores
 from sim.boat.row_codec import correlation_matrix
 from sim.files.errors import InputError
 
-# Core types of OpenBLAS and what a processor needs to execute them.
-CORE_TYPES = {
-    "Nehalem": {"sse4_2"},
-    "Sandybridge": {"avx"},
-    "Haswell": {"avx2", "fma"},
-    "Zen": {"avx2", "fma"},
-    "SkylakeX": {"avx512f", "avx512dq", "avx512bw", "avx512vl"},
-}
 ELSEWHERE = """
 import hashlib, json, sys
 from dataclasses import asdict
@@ -49,20 +41,6 @@ print(json.dumps({"product": digest(product), "same": [digest(drawn), digest(wit
 """
 
 
-def _settings() -> list[dict[str, str]]:
-    """Environments of linear algebra that this machine can run."""
-    known: list[str] = []
-    if platform.machine() in ("x86_64", "AMD64") and Path("/proc/cpuinfo").is_file():
-        text = Path("/proc/cpuinfo").read_text()
-        flags = set(next(line for line in text.splitlines() if line.startswith("flags")).split())
-        known = [name for name, needs in CORE_TYPES.items() if needs <= flags]
-        assert len(known) >= 3, "a processor of the last ten years"
-        # The oldest and the two newest: each takes seconds.
-        known = [known[0], *known[-2:]]
-    types = [{"OPENBLAS_CORETYPE": name} for name in known] or [{}]
-    return [own | {f"{k}_NUM_THREADS": n for k in ("OPENBLAS", "OMP", "MKL")} for own in types for n in ("1", "2")]
-
-
 @pytest.fixture(scope="module")
 def correlation(rows):
     return correlation_matrix(rows)[1]
@@ -73,7 +51,7 @@ def test_draws_and_what_follows_are_the_same_under_any_linear_algebra(correlatio
     np.save(tmp_path / "correlation.npy", correlation)
     root = str(Path(__file__).parents[1])
     found = []
-    for own in _settings():
+    for own in [kernel | threads(n) for kernel in kernels() for n in (1, 2)]:
         command = [sys.executable, "-c", ELSEWHERE, str(tmp_path / "correlation.npy")]
         environment = os.environ | own | {"PYTHONPATH": root}
         done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)

@@ -28,6 +28,10 @@ from sim.boat.vehicle import Vehicle
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
+# Significant digits that are stored. Estimates come of sums over a surface, whose last digits differ between
+# processors: of some hundred values one was at a tie of the twelfth digit.
+_DIGITS, _ESTIMATED_DIGITS = 12, 10
+
 
 class NotApplicable(Exception):
     """An estimate has nothing to work from; the text says what is missing."""
@@ -224,9 +228,15 @@ def with_covariance(rows: pd.DataFrame, numbers: Sequence[int], total: Array) ->
     where = np.array([place.get(int(e), -1) for e in out["estimate"]])
     out.loc[where >= 0, "stderr"] = deviation[where[where >= 0]]
     out["correlation"] = [text.get(int(e), "") for e in out["estimate"]]
+    touched = out["estimated_by"].ne("").tolist()
     for column in (*NUMBERS, *OPTIONAL):
-        out[column] = [x if np.isnan(x) else float(f"{x:.12g}") for x in out[column]]
+        fewer = [t and column not in OPTIONAL for t in touched]
+        out[column] = [_stored(x, _ESTIMATED_DIGITS if f else _DIGITS) for x, f in zip(out[column], fewer, strict=True)]
     return out[column_order()]
+
+
+def _stored(x: float, digits: int) -> float:
+    return x if np.isnan(x) else float(f"{x:.{digits}g}")
 
 
 def measured_rows(rows: pd.DataFrame) -> pd.DataFrame:
