@@ -70,7 +70,7 @@ def export(
 
 
 def _rows(path: Path, kind: str, db: str, version: int | None) -> dict[str, Any]:
-    from ident.database.compare import export as run
+    from ident.database import compare
     from ident.output import check_folder
 
     check_folder(path)
@@ -78,7 +78,7 @@ def _rows(path: Path, kind: str, db: str, version: int | None) -> dict[str, Any]
         from ident.exports.exchange import export_exchange
 
         return export_exchange(db, version, path)
-    return run(db, version, kind, path)
+    return compare.export(db, version, kind, path)
 
 
 def _flown(

@@ -133,9 +133,9 @@ def vacuum(db: str, wait: float, dry_run: bool, json_path: str | None) -> None:
     Example: ident vacuum --db coeff_db
              ident vacuum --db coeff_db --dry-run --json -
     """
-    from ident.database.leftovers import vacuum as run
+    from ident.database import leftovers
 
-    removed = run(db, wait, dry_run)
+    removed = leftovers.vacuum(db, wait, dry_run)
     if json_path != "-":
         verb = "would be removed" if dry_run else "removed"
         for name, size in removed.items():

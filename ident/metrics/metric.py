@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 
 # Name -> value of one flight or of one recording; None where the maneuver does not come to it.
 Values = dict[str, float | None]
@@ -37,6 +37,7 @@ class Metric(Mapping[str, float | None]):
     columns : ``simulated``, ``simulated_as_<source>``, each source and ``published_model`` -> value, None where the
         maneuver does not come to it.
     interval : Over samples; None when none were flown.
+    sigma : Column -> standard error, of recorded trials; not among the columns of the mapping.
 
     Examples
     --------
@@ -47,6 +48,7 @@ class Metric(Mapping[str, float | None]):
 
     columns: Values
     interval: Interval | None = None
+    sigma: dict[str, float] = field(default_factory=dict)
 
     @property
     def simulated(self) -> float | None:

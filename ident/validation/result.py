@@ -86,7 +86,6 @@ class Validation:
     passed : Whether the run is complete and every tolerance of the case is met.
     bands : Error bands from sampled coefficients; None when none were flown.
     saturated : Actuators that lay at their limit.
-    metrics_sigma : Metric -> source -> standard error, of recorded trials.
     notes : What was left out, scaled or limited because another boat flew the case.
 
     Examples
@@ -120,7 +119,11 @@ class Validation:
     bands: Bands | None = None
     saturated: list[Saturated] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
-    metrics_sigma: dict[str, dict[str, float]] = field(default_factory=dict)
+
+    @property
+    def metrics_sigma(self) -> dict[str, dict[str, float]]:
+        """Metric -> source -> standard error, of recorded trials."""
+        return {name: metric.sigma for name, metric in self.metrics.items() if metric.sigma}
 
     @property
     def complete(self) -> bool:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Collection
+from dataclasses import replace
 from pathlib import Path
 from typing import Literal
 
@@ -250,7 +251,7 @@ def validate(
         boat=boat,
         db=os.fspath(db),
         errors=channel_errors,
-        metrics=metrics,
+        metrics={name: replace(m, sigma=held.sigma.get(name, {})) for name, m in metrics.items()},
         as_started=as_started,
         outside_tables=outside,
         constant_axes=constant,
@@ -260,7 +261,6 @@ def validate(
         passed=bool(np.isfinite(simulation.end).all() and met),
         saturated=saturated(simulation, flown, ship),
         notes=[*notes, *beyond_the_run(flown, held.series, simulation, as_started)],
-        metrics_sigma={k: v for k, v in held.sigma.items() if k in metrics},
     )
 
 

@@ -89,22 +89,13 @@ def _search(
     )
 
 
-def _solve(
-    model: Model,
-    mixer: Array,
-    speed: float,
-    depth: float,
-    free: tuple[str, ...],
-    values: dict[str, float],
-    upright: bool,
-) -> tuple[Trim, str]:
-    """Root of the six balances over n, heel (or, upright, y of the weight), drift, dH and ``free``.
+def _solve(search: Search, model: Model) -> tuple[Trim, str]:
+    """Root of the six balances over n, heel (or, upright, y of the weight), drift, dH and what is free.
 
     Returns
     -------
     The state found and, if it is no equilibrium, what is wrong with it.
     """
-    search = _search(model, mixer, speed, depth, free, values, upright)
     state, derivative, controls = search.y, search.dy, search.c
 
     def residual(x: Array) -> Array:
@@ -124,13 +115,12 @@ def _solve(
     left = float(np.abs(residual(x)).max())
     wrong = ""
     if not left <= _BALANCED:
-        wrong = (
-            f"no self-propulsion state at {speed:.4g} m/s and D0 = {depth:.4g} m; {_closest(state, controls, mixer)}"
-        )
+        place_of = f"{search.speed:.4g} m/s and D0 = {search.z + model.sail_top:.4g} m"
+        wrong = f"no self-propulsion state at {place_of}; {_closest(state, controls, search.mixer)}"
     # The path is straight: heading such that the course is along earth x.
     # Along north through the water, whatever carries it.
     state[11] = -np.arctan2(derivative[7] - model.current[1], derivative[6] - model.current[0])
-    lateral = float(x[3]) if upright else 0.0
+    lateral = float(x[3]) if search.upright else 0.0
     return Trim(state, controls, float(search.level[DV]), float(x[5]), left, lateral=lateral), wrong
 
 
@@ -181,7 +171,7 @@ def self_propulsion(
     limits = dict(zip(TANK_NAMES, tank_limit or (np.inf, np.inf), strict=True))
     limited: tuple[str, ...] = ()
     while True:
-        trim, wrong = _solve(model, mixer, speed, depth, free, values, upright)
+        trim, wrong = _solve(_search(model, mixer, speed, depth, free, values, upright), model)
         if wrong:
             raise NoEquilibrium(wrong)
         amounts = dict(zip(TANK_NAMES, trim.controls[mixer.shape[0] + 1 :], strict=model.has_tanks))
