@@ -78,19 +78,19 @@ def discrepancies(channels: list[Channel], rms: Sequence[float]) -> Array:
     """
     from scipy.optimize import minimize_scalar
 
-    own = np.array([c.reading**2 + c.against**2 for c in channels])
+    stated = np.array([c.reading**2 + c.against**2 for c in channels])
     square, count = np.square(rms), np.array([c.pieces for c in channels])
     out = np.zeros(len(channels))
     for shared in dict.fromkeys((c.key[0], c.key[2]) for c in channels):
         k = [i for i, c in enumerate(channels) if (c.key[0], c.key[2]) == shared]
 
         def loss(log_s: float, k: list[int] = k) -> float:
-            variance = np.exp(2.0 * log_s) + own[k]
+            variance = np.exp(2.0 * log_s) + stated[k]
             return float(np.sum(count[k] * (np.log(variance) + square[k] / variance)))
 
         top = np.log(np.sqrt(square[k].max()) + 1e-300)
         best = minimize_scalar(loss, bounds=(top - 9.0, top + 1.0), method="bounded", options={"xatol": 1e-6})
-        out[k] = np.sqrt(np.exp(2.0 * best.x) + own[k])
+        out[k] = np.sqrt(np.exp(2.0 * best.x) + stated[k])
     return out
 
 

@@ -228,8 +228,8 @@ def _rows_of(group: Group, rows: pd.DataFrame, where: str) -> Mask:
             allowed = ", ".join(catalogue.axes())
             key = "nonzero" if axis in group.nonzero else "at_least"
             raise InputError(f"{where}, group {group.name}, key {key}", repr(axis), allowed)
-        found = rows[columns[axis]].fillna(0.0).abs()
-        chosen &= ((found >= size) & (found > 0.0)).to_numpy()
+        along = rows[columns[axis]].fillna(0.0).abs()
+        chosen &= ((along >= size) & (along > 0.0)).to_numpy()
     if not chosen.any():
         text = "terms and parts that the database version holds"
         raise InputError(f"{where}, group {group.name}", f"no value matches {' '.join(group.terms)}", text)
@@ -242,8 +242,8 @@ def _whole_estimates(group: Group, rows: pd.DataFrame, chosen: Mask, where: str)
     shared = set(estimate[chosen & (estimate >= 0)]) & set(estimate[~chosen & (estimate >= 0)])
     if shared:
         row = rows[(estimate == min(shared)) & ~chosen].iloc[0]
-        found = f"{row['coefficient']} of {row['part']} is left out, which is the mirror image of one inside"
-        raise InputError(f"{where}, group {group.name}", found, "a value together with its mirror image")
+        wrong = f"{row['coefficient']} of {row['part']} is left out, which is the mirror image of one inside"
+        raise InputError(f"{where}, group {group.name}", wrong, "a value together with its mirror image")
 
 
 def captive_sigma(rows: pd.DataFrame, chosen: Mask, kind: str) -> float:
@@ -310,14 +310,14 @@ def parameters(spec: CalibrationFile, vehicle: Vehicle, rows: pd.DataFrame, wher
         For a group without rows, one that splits a value from its mirror image, or a prior
         without spread.
     """
-    found = []
+    chosen_parameters = []
     for group in spec.group:
         chosen = _rows_of(group, rows, where)
         _whole_estimates(group, rows, chosen, where)
         captive = captive_sigma(rows, chosen, group.kind)
         mean, sigma, method = _prior(group, captive, vehicle, rows, chosen, where)
-        found.append(Parameter(group, chosen, mean, sigma, captive, method))
-    return found
+        chosen_parameters.append(Parameter(group, chosen, mean, sigma, captive, method))
+    return chosen_parameters
 
 
 def apply(values: Array, chosen: list[Parameter], theta: Array) -> Array:

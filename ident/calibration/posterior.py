@@ -231,11 +231,13 @@ def sample(
     independent = steps * walkers / max(longest, 1.0)
     groups = {}
     for i, parameter in enumerate(task.chosen):
-        own, optimum, sigma = walk[:, :, i].ravel(), estimate.theta[i], estimate.deviation[i]
-        low, middle, high = (float(q) for q in np.quantile(own, [0.025, 0.5, 0.975]))
-        deviation = float(own.std())
-        shift, error = (float(x) for x in ((own.mean() - optimum) / sigma, deviation / sigma / math.sqrt(independent)))
+        drawn, optimum, sigma = walk[:, :, i].ravel(), estimate.theta[i], estimate.deviation[i]
+        low, middle, high = (float(q) for q in np.quantile(drawn, [0.025, 0.5, 0.975]))
+        deviation = float(drawn.std())
+        shift, error = (
+            float(x) for x in ((drawn.mean() - optimum) / sigma, deviation / sigma / math.sqrt(independent))
+        )
         width = float(deviation / sigma)
-        groups[parameter.group.name] = Marginal(float(own.mean()), deviation, low, middle, high, shift, error, width)
+        groups[parameter.group.name] = Marginal(float(drawn.mean()), deviation, low, middle, high, shift, error, width)
     burnt = int(_BURNT * max(-(-draws // walkers), 2))
     return Sampled(walkers, steps + burnt, seed, taken, longest, independent, groups)

@@ -134,14 +134,14 @@ class Problem:
                 flown[name] = fly(case, self.vehicle, model, self.craft.water(case))
             except NoEquilibrium:
                 flown[name] = None
-        found = []
+        every = []
         for channel in self.channels:
             one = flown[channel.key[0]]
             if one is None:
-                found.append(np.full(channel.along.size, _LOST * float(np.abs(channel.value).max())))
+                every.append(np.full(channel.along.size, _LOST * float(np.abs(channel.value).max())))
             else:
-                found.append(channel.residual(one, self.cases[channel.key[0]][1]))
-        return found
+                every.append(channel.residual(one, self.cases[channel.key[0]][1]))
+        return every
 
 
 def pieces(value: Array) -> int:
@@ -188,8 +188,8 @@ def _channel(training: Training, reference: Series, name: str, channel: str, use
     )
 
 
-def _refuse(where: str, training: Training, key: str, found: str, allowed: Sequence[str]) -> InputError:
-    return InputError(f"{where}, training {training.case}, key {key}", repr(found), ", ".join(allowed))
+def _refuse(where: str, training: Training, key: str, given: str, allowed: Sequence[str]) -> InputError:
+    return InputError(f"{where}, training {training.case}, key {key}", repr(given), ", ".join(allowed))
 
 
 def _flown(held: Referenced, recorded: bool) -> Case:
@@ -217,8 +217,8 @@ def problem(
     cases: dict[str, tuple[Case, str]] = {}
     channels: list[Channel] = []
     for training in spec.training:
-        own = Path(where).parent / training.case
-        case, place = load_case(own if training.case.endswith(".toml") else training.case)
+        beside = Path(where).parent / training.case
+        case, place = load_case(beside if training.case.endswith(".toml") else training.case)
         held = referenced(case, place)
         recorded = case.reference is not None and case.reference.controls == "recorded"
         case, reference = held.case, held.series

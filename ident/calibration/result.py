@@ -179,8 +179,8 @@ class Summary:
 
     def to_dict(self) -> dict[str, Any]:
         """The summary for a program to read; without what was not asked for."""
-        found = asdict(self)
-        return {k: v for k, v in found.items() if v is not None}
+        plain = asdict(self)
+        return {k: v for k, v in plain.items() if v is not None}
 
 
 @dataclass(frozen=True)

@@ -107,9 +107,9 @@ def indices(described: dict[str, Any], outputs: Array, seed: int) -> list[Share]
     seed : Of the bootstrap.
     """
     level = {"conf_level": _LEVEL, "calc_second_order": False, "seed": seed}
-    found = salib()[1].analyze(described, np.asarray(outputs), **level)
+    analysed = salib()[1].analyze(described, np.asarray(outputs), **level)
     keys = ("S1", "S1_conf", "ST", "ST_conf")
-    return [Share(*(float(found[key][i]) for key in keys)) for i in range(described["num_vars"])]
+    return [Share(*(float(analysed[key][i]) for key in keys)) for i in range(described["num_vars"])]
 
 
 def main_direction(outputs: Array) -> tuple[Array, float]:
@@ -150,14 +150,14 @@ def sensitivity(
         first.setdefault((c.key[0], c.key[2]), i)
     flown = _flown(task, points, list(first.values()), workers, each)
     names = [p.group.name for p in task.chosen]
-    found = []
+    sensitivities = []
     for (case, channel), outputs in zip(first, flown, strict=True):
         scores, along = main_direction(outputs)
         if along == 0.0:
             continue
         shares = indices(described, scores, seed)
-        found.append(Sensitivity(case, channel, along, dict(zip(names, shares, strict=True))))
-    return found
+        sensitivities.append(Sensitivity(case, channel, along, dict(zip(names, shares, strict=True))))
+    return sensitivities
 
 
 def _flown(

@@ -48,15 +48,15 @@ def captive_version(db: str, vehicle: str, number: int | None) -> Version:
         When there is none, or the one asked for is itself calibrated.
     """
     if number is not None:
-        found = own_version(db, vehicle, number)
-        if json.loads(found.metadata.get("trained", "[]")):
+        captive = own_version(db, vehicle, number)
+        if json.loads(captive.metadata.get("trained", "[]")):
             raise InputError(
                 f"{db}, version {number}", "a calibrated version", "a captive-only one; see `ident versions`"
             )
-        return found
+        return captive
     for version in reversed(versions(db)):
-        own = version.metadata.get("vehicle", vehicle) == vehicle
-        if own and not json.loads(version.metadata.get("trained", "[]")):
+        of_vehicle = version.metadata.get("vehicle", vehicle) == vehicle
+        if of_vehicle and not json.loads(version.metadata.get("trained", "[]")):
             return version
     raise InputError(db, f"no captive version of {vehicle}", "a version written by `ident fit`")
 
@@ -119,7 +119,7 @@ def _identifiability(task: Problem, estimate: Estimate) -> list[str]:
 
 def _left_out(task: Problem, whole: Estimate, workers: int | None, each: Callable[[str], None]) -> list[LeftOut]:
     """The calibration repeated without each source of each case, and what it then predicts."""
-    found = []
+    repeated = []
     for out in dict.fromkeys(c.key[:2] for c in task.channels):
 
         def dropped(channel: Channel, out: tuple[str, str] = out) -> bool:
@@ -136,9 +136,9 @@ def _left_out(task: Problem, whole: Estimate, workers: int | None, each: Callabl
         }
         shift = (estimate.theta - whole.theta) / np.maximum(estimate.deviation, whole.deviation)
         trained = {k[2]: v for k, v in whole.rms.items() if k[:2] == out}
-        values, sigmas, shifts = ([float(x) for x in own] for own in (estimate.theta, estimate.deviation, shift))
-        found.append(LeftOut(*out, values, sigmas, shifts, predicted, trained))
-    return found
+        values, sigmas, shifts = ([float(x) for x in vector] for vector in (estimate.theta, estimate.deviation, shift))
+        repeated.append(LeftOut(*out, values, sigmas, shifts, predicted, trained))
+    return repeated
 
 
 def _shifts(task: Problem, left_out: list[LeftOut]) -> list[str]:
@@ -229,12 +229,12 @@ def _solved(every: Problem, choose: str, workers: int | None, each: Callable[[st
 
 def _groups(every: Problem, solved: Solved) -> list[Group]:
     """Every group as it stands: free ones at their posterior, held ones at their prior."""
-    found, gain = [], solved.comparison.gain
+    groups, gain = [], solved.comparison.gain
     free = dict(zip(solved.kept, zip(solved.estimate.theta, solved.estimate.deviation, strict=True), strict=True))
     for i, parameter in enumerate(every.chosen):
         value, sigma = free.get(i, (parameter.mean, parameter.sigma))
-        found.append(_group(parameter, float(value), float(sigma), i in free, gain[i]))
-    return found
+        groups.append(_group(parameter, float(value), float(sigma), i in free, gain[i]))
+    return groups
 
 
 def _in_force(solved: Solved) -> tuple[list[Parameter], Estimate]:
@@ -300,7 +300,7 @@ def calibrate(
     name, db = os.fspath(name), os.fspath(db)
     if posterior:
         emcee()
-    spec, where, own = load_calibration(name)
+    spec, where, file_digest = load_calibration(name)
     vehicle = load_vehicle(spec.vehicle, beside=where)
     base = captive_version(db, vehicle.name, version)
     rows, _ = read_rows(db, base.number, vehicle.name)
@@ -319,7 +319,7 @@ def calibrate(
         parent=base.number,
         parent_digest=base.digest,
         source=spec.source,
-        file_digest=own,
+        file_digest=file_digest,
         trained=list(dict.fromkeys(f"{c.key[0]}:{c.key[1]}" for c in task.channels)),
         groups=_groups(every, solved),
         covariance=estimate.covariance.tolist(),

@@ -162,8 +162,8 @@ def _same_template(out: Path, template: Template) -> None:
     """A matrix has one scale and one density."""
     other = read_campaign(out, none_yet=True).header
     if other.scale.ratio != template.surface.ratio or other.fluid.density_kgpm3 != template.fluid.density_kgpm3:
-        found = f"ratio {other.scale.ratio:g} and density {other.fluid.density_kgpm3:g} in {out}"
-        raise InputError("--template", found, "the same surface.ratio and fluid, or another folder")
+        wrong = f"ratio {other.scale.ratio:g} and density {other.fluid.density_kgpm3:g} in {out}"
+        raise InputError("--template", wrong, "the same surface.ratio and fluid, or another folder")
 
 
 def _table(cases: list[Case], template: Template) -> pd.DataFrame:

@@ -186,7 +186,7 @@ def write_case(
     """
     system, constant = folder / "system", folder / "constant"
     walls = list(body.patches)
-    parts = {part: list(own) for part, own in template.parts.items()}
+    parts = {part: list(of_part) for part, of_part in template.parts.items()}
     write_dictionary(system / "controlDict", d.control(template, motion, parts, centre, wall))
     write_dictionary(system / "fvSchemes", d.schemes(motion))
     write_dictionary(system / "fvSolution", d.solution(template, motion))
@@ -202,8 +202,8 @@ def write_case(
         cores = template.machine.cores
         split = {"numberOfSubdomains": cores, "method": "hierarchical", "coeffs": {"n": [cores, 1, 1]}}
         write_dictionary(system / "decomposeParDict", split)
-    found = d.fields(template, motion, walls, body.surface_z is not None, speed, body.length)
-    for name, (dimensions, inner, patches) in found.items():
+    fields = d.fields(template, motion, walls, body.surface_z is not None, speed, body.length)
+    for name, (dimensions, inner, patches) in fields.items():
         write_field(folder / "0.orig" / name, dimensions, inner, patches)
     _script(
         folder / "Allrun",

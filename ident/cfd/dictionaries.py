@@ -34,10 +34,10 @@ def time_steps(template: Template, motion: Motion, wall: float) -> int:
     motion : Its greatest speed and duration.
     wall : Length of a cell on the wall [m].
     """
-    own = settings()
-    least = own["least_steps"]
+    stated = settings()
+    least = stated["least_steps"]
     if motion.oscillates:
-        least = own["least_steps_a_period"] * round(motion.duration * motion.frequency)
+        least = stated["least_steps_a_period"] * round(motion.duration * motion.frequency)
     return max(int(least), math.ceil(motion.fastest * motion.duration / (template.unsteady.courant * wall)))
 
 
@@ -124,7 +124,7 @@ def schemes(motion: Motion) -> Entries:
 
 def solution(template: Template, motion: Motion) -> Entries:
     """``system/fvSolution``: consistent SIMPLE, or PIMPLE."""
-    own = settings()
+    stated = settings()
     sweep = {"solver": "smoothSolver", "smoother": "symGaussSeidel", "tolerance": 1e-9, "relTol": 0.05}
     pressure = {"solver": "GAMG", "smoother": "GaussSeidel", "tolerance": 1e-9, "relTol": 0.02}
     if motion.steady:
@@ -137,7 +137,7 @@ def solution(template: Template, motion: Motion) -> Entries:
                 "pRefCell": 0,
                 "pRefValue": 0,
             },
-            "relaxationFactors": {"equations": {fields: own["relax_u"], "p": own["relax_p"]}},
+            "relaxationFactors": {"equations": {fields: stated["relax_u"], "p": stated["relax_p"]}},
         }
     return {
         "solvers": {
@@ -147,8 +147,8 @@ def solution(template: Template, motion: Motion) -> Entries:
             '"(U|k|omega)Final"': {**sweep, "relTol": 0},
         },
         "PIMPLE": {
-            "nOuterCorrectors": int(own["outer"]),
-            "nCorrectors": int(own["correctors"]),
+            "nOuterCorrectors": int(stated["outer"]),
+            "nCorrectors": int(stated["correctors"]),
             "nNonOrthogonalCorrectors": 1,
             "pRefCell": 0,
             "pRefValue": 0,
@@ -184,10 +184,10 @@ def fields(template: Template, motion: Motion, walls: list[str], surface: bool, 
         "p": ((0, 2, -2), 0.0, pressure),
     }
     if kind == "kOmegaSST":
-        own, nu = settings(), template.fluid.kinematic_viscosity_m2ps
-        intensity = template.flow.intensity or own["intensity"]
+        stated, nu = settings(), template.fluid.kinematic_viscosity_m2ps
+        intensity = template.flow.intensity or stated["intensity"]
         k = 1.5 * (intensity * speed) ** 2
-        nut = (template.flow.viscosity_ratio or own["viscosity_ratio"]) * nu
+        nut = (template.flow.viscosity_ratio or stated["viscosity_ratio"]) * nu
         omega = k / nut
         for name, dims, value, kind_of_wall in (
             ("k", (0, 2, -2), k, "kqRWallFunction"),

@@ -170,8 +170,8 @@ def _prepared(
     if template.disc:
         planned += _propelled(start + len(planned), vehicle, lines, template, where)
     if not planned:
-        found = "; ".join(f"{k}: {v}" for k, v in matrix.left_out.items()) or "no run in the plan"
-        raise InputError("plan", found, "runs that a case can be written for; another --target-rel, or a --facility")
+        wrong = "; ".join(f"{k}: {v}" for k, v in matrix.left_out.items()) or "no run in the plan"
+        raise InputError("plan", wrong, "runs that a case can be written for; another --target-rel, or a --facility")
     return planned
 
 
@@ -181,9 +181,9 @@ def _one_depth(runs: pd.DataFrame, cases: list[Case], template: Template, length
         return
     depths = sorted({*runs["D0"].dropna(), *(c.state["D0"] for c in cases if "D0" in c.state)})
     if len(depths) > 1 and depths[-1] - depths[0] > _SAME_DEPTH * length:
-        found = f"runs at {len(depths)} depths, {depths[0]:g} to {depths[-1]:g} m, and free_surface = 'none'"
+        wrong = f"runs at {len(depths)} depths, {depths[0]:g} to {depths[-1]:g} m, and free_surface = 'none'"
         text = "one depth_m in the --facility file, or free_surface = 'double_body'"
-        raise InputError(f"{where}, key flow.free_surface", found, text)
+        raise InputError(f"{where}, key flow.free_surface", wrong, text)
 
 
 def _case(name: str, run: pd.Series, vehicle: Vehicle, lines: Lines, template: Template, where: str) -> _Written:
@@ -198,10 +198,10 @@ def _case(name: str, run: pd.Series, vehicle: Vehicle, lines: Lines, template: T
     plane = float(run["plane"]) if run["plane"] == run["plane"] else 0.0
     patches, mesh = lines.patches, "hull"
     if abs(plane) > 0.0:
-        own = [p for p in vehicle.planes if p.name == part]
-        if not own:
+        named = [p for p in vehicle.planes if p.name == part]
+        if not named:
             raise InputError(place, f"{part} at {math.degrees(plane):g} deg", "a run of a plane")
-        patches = turned(lines, template.parts[part], own[0], plane, ratio, where)
+        patches = turned(lines, template.parts[part], named[0], plane, ratio, where)
         mesh = f"{part}_{_word(math.degrees(plane))}"
     surface_z = None
     if template.flow.free_surface == "double_body":
@@ -266,14 +266,14 @@ def _propelled(start: int, vehicle: Vehicle, lines: Lines, template: Template, w
         raise InputError(f"vehicle {vehicle.name}, key propeller.position", "nothing", "where the disc is")
     ratio = template.surface.ratio
     out: list[_Written] = []
-    for own in template.disc:
-        speed, depth = own.speed_mps / math.sqrt(ratio), own.depth_m / ratio
+    for disc_point in template.disc:
+        speed, depth = disc_point.speed_mps / math.sqrt(ratio), disc_point.depth_m / ratio
         state = pd.Series({**dict.fromkeys(STATES, math.nan), "U": speed, "alpha": 0.0, "beta": 0.0, "D0": depth})
         run = pd.concat([state, pd.Series({"test": "towing", "part": "hull"})])
         towed = _case(f"P{start + len(out) + 1:03d}", run, vehicle, lines, template, where)
         diameter = propeller.diameter.value / ratio
-        disc = Disc(np.array(propeller.position.value) / ratio, 0.5 * diameter, own.thickness * diameter)
-        thrust = own.thrust_n / ratio**3
+        disc = Disc(np.array(propeller.position.value) / ratio, 0.5 * diameter, disc_point.thickness * diameter)
+        thrust = disc_point.thrust_n / ratio**3
         motion = Motion("propelled", far=towed.motion.far, thrust=thrust / template.fluid.density_kgpm3)
         body = Body(towed.body.patches, towed.body.length, towed.body.surface_z, disc)
         case = Case(
@@ -282,12 +282,12 @@ def _propelled(start: int, vehicle: Vehicle, lines: Lines, template: Template, w
             "hull",
             towed.case.state,
             "propelled",
-            f"{towed.case.mesh}_disc_{_word(own.thickness)}",
+            f"{towed.case.mesh}_disc_{_word(disc_point.thickness)}",
             towed.case.grids,
             iterations=template.steady.iterations,
             towed=towed.case.run_id,
             thrust_n=thrust,
-            thrust_source=own.source,
+            thrust_source=disc_point.source,
         )
         out += [towed, _Written(case, motion, body, np.zeros(3), towed.speed)]
     return out

@@ -123,8 +123,8 @@ def motion_of(run: pd.Series, template: Template, length: float, where: str) -> 
     rate = np.array([state["p"], state["q"], state["r"]])
     driven = [k for k in _ACCELERATIONS if abs(state[k]) > _NOTHING]
     if driven and (len(driven) > 1 or state["U"] > _NOTHING or np.abs(rate).max() > _NOTHING):
-        found = " ".join([*driven, *(["at speed"] if state["U"] > _NOTHING else [])])
-        raise InputError(where, found, "one acceleration at a time, without speed and rates")
+        wrong = " ".join([*driven, *(["at speed"] if state["U"] > _NOTHING else [])])
+        raise InputError(where, wrong, "one acceleration at a time, without speed and rates")
     double = template.flow.free_surface == "double_body"
     if driven:
         return _accelerated(driven[0], state[driven[0]], template, length, where, double)
@@ -143,11 +143,11 @@ def motion_of(run: pd.Series, template: Template, length: float, where: str) -> 
 
 def _accelerated(name: str, value: float, template: Template, length: float, where: str, double: bool) -> Motion:
     """A constant acceleration from rest, or the oscillation with it as its amplitude."""
-    own = template.unsteady
+    unsteady = template.unsteady
     angular = name in ("pdot", "qdot", "rdot")
-    travel = own.travel if angular else own.travel * length
+    travel = unsteady.travel if angular else unsteady.travel * length
     flat = name in ("udot", "vdot", "rdot")
-    if own.kind == "oscillation":
+    if unsteady.kind == "oscillation":
         if double and not flat:
             raise InputError(
                 where, f"an oscillation of {_MOTION_OF[name]} near the surface", "free_surface = 'none' for it"
@@ -156,7 +156,7 @@ def _accelerated(name: str, value: float, template: Template, length: float, whe
         return Motion(
             "spun" if angular else "moving",
             acceleration=(name, value),
-            duration=(own.periods or 3) * 2.0 * math.pi / omega,
+            duration=(unsteady.periods or 3) * 2.0 * math.pi / omega,
             oscillates=True,
             amplitude=travel,
             fastest=omega * travel * (0.5 * length if angular else 1.0),

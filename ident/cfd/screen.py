@@ -44,36 +44,36 @@ def show_batch(batch: Batch, console: Console) -> None:
         console.print(f"  [yellow]left out[/] {escape(run)}: {escape(why)}", highlight=False)
     new = [c for c in batch.matrix.cases if c.run_id in set(batch.matrix.new)]
     for kind in dict.fromkeys(c.kind for c in new):
-        own = [c for c in new if c.kind == kind]
-        console.print(f"  {kind}: {' '.join(c.run_id for c in own)}", highlight=False)
+        of_kind = [c for c in new if c.kind == kind]
+        console.print(f"  {kind}: {' '.join(c.run_id for c in of_kind)}", highlight=False)
     folders = sum(len(c.grids) for c in new)
     place = on_screen(batch.matrix.folder)
     console.print(f"[bold]{len(new)} runs, {folders} cases[/] in {place}; {place}/Allrun runs them", highlight=False)
 
 
-def show_progress(found: Progress, console: Console) -> None:
+def show_progress(progress: Progress, console: Console) -> None:
     """Print how far each run is, the end of the log of every dead one, and what to start again."""
     from rich.markup import escape
     from rich.table import Table
 
-    table = Table(title=on_screen(f"{found.matrix.folder}: {len(found.matrix.cases)} runs"), title_justify="left")
+    table = Table(title=on_screen(f"{progress.matrix.folder}: {len(progress.matrix.cases)} runs"), title_justify="left")
     for name in ("run", "test", "part", "made by", "grids", "loads"):
         table.add_column(name)
-    for case in found.matrix.cases:
-        own = [s for s in found.states if s.run_id == case.run_id]
-        words = [f"{s.grid} {s.word}" + (f" {100 * s.share:.0f} %" if s.word == "running" else "") for s in own]
-        back = all(s.word == "done" for s in own)
-        bad = [why for run, why in found.unconverged.items() if run == case.run_id]
+    for case in progress.matrix.cases:
+        of_run = [s for s in progress.states if s.run_id == case.run_id]
+        words = [f"{s.grid} {s.word}" + (f" {100 * s.share:.0f} %" if s.word == "running" else "") for s in of_run]
+        back = all(s.word == "done" for s in of_run)
+        bad = [why for run, why in progress.unconverged.items() if run == case.run_id]
         loads = "" if not back else f"[yellow]{escape(bad[0])}[/]" if bad else "[green]converged[/]"
         table.add_row(case.run_id, escape(case.test), escape(case.part), case.kind, ", ".join(words), loads)
     console.print(table)
-    for state in (*found.of("died"), *found.of("stopped")):
+    for state in (*progress.of("died"), *progress.of("stopped")):
         console.print(f"[red]{state.run_id} {state.grid} {state.word}[/] in {escape(state.step)}:", highlight=False)
         for line in state.end.splitlines():
             console.print(on_screen(line), highlight=False, soft_wrap=True)
-    for command, why in found.restart:
+    for command, why in progress.restart:
         console.print(f"  start again: {on_screen(command)}   ({escape(why)})", highlight=False)
     counts = ", ".join(
-        f"{len(found.of(w))} {w}" for w in ("done", "running", "waiting", "died", "stopped") if found.of(w)
+        f"{len(progress.of(w))} {w}" for w in ("done", "running", "waiting", "died", "stopped") if progress.of(w)
     )
-    console.print(f"[bold]{len(found.states)} cases: {counts}[/]", highlight=False)
+    console.print(f"[bold]{len(progress.states)} cases: {counts}[/]", highlight=False)

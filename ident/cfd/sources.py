@@ -71,7 +71,7 @@ def source(case: Case, template: Template) -> dict[str, Any]:
     constants["source"] = f"OpenFOAM {template.openfoam}, {case.kind}"
     constants |= {_key(name): _number(name, value) for name, value in case.state.items() if not _made(name, case)}
     constants["rel_sigma"] = template.uncertainty.rel_sigma
-    own: dict[str, Any] = {
+    made: dict[str, Any] = {
         "files": f"cases/{case.run_id}/{case.grids[0]}/postProcessing",
         "reader": "openfoam",
         "rows": "history",
@@ -82,18 +82,18 @@ def source(case: Case, template: Template) -> dict[str, Any]:
         "reduction": _reduction(case),
     }
     if case.axes != "body":
-        own["axes"] = case.axes
+        made["axes"] = case.axes
     elif case.frequency_hz:
-        own["axes"] = "body"
+        made["axes"] = "body"
     if case.towed:
-        own["deduction"] = {
+        made["deduction"] = {
             "towed": f"cases/{case.towed}/{case.grids[0]}/postProcessing",
             "thrust_n": case.thrust_n,
             "source": case.thrust_source,
         }
     if len(case.grids) == 3:
-        own["grids"] = {"finest": case.grids[0], "coarser": case.grids[1:], "refinement": template.grid.refinement}
-    return own
+        made["grids"] = {"finest": case.grids[0], "coarser": case.grids[1:], "refinement": template.grid.refinement}
+    return made
 
 
 def _made(name: str, case: Case) -> bool:

@@ -72,7 +72,7 @@ def stern_factors(fins: list[Fin], radius: float, counts: tuple[int, int, int] =
 
     Returns
     -------
-    ``own`` (load over density, speed^2 and angle [m^2]), and on it: ``root``, ``hull``,
+    ``on_plane`` (load over density, speed^2 and angle [m^2]), and on it: ``root``, ``hull``,
     ``others``, ``force`` (their sum with the plane), ``roll`` (of all fins), and ``incidence``.
     """
     grid = lattice(fins, counts)
@@ -84,7 +84,7 @@ def stern_factors(fins: list[Fin], radius: float, counts: tuple[int, int, int] =
     normal = grid.normal[0]
     loads = normal_load(circulation, grid.a, grid.b, normal)
     hull = float(normal_load(circulation, image_a, image_b, normal).sum())
-    own = float(loads[plane].sum())
+    on_plane = float(loads[plane].sum())
     middle = np.linalg.norm(0.5 * (grid.a + grid.b)[:, 1:], axis=1)
     turning = circulation * np.linalg.norm((grid.b - grid.a)[:, 1:], axis=1) * middle
     # Cross-flow along the deflected plane's normal, with the cylinder's own disturbance.
@@ -96,13 +96,13 @@ def stern_factors(fins: list[Fin], radius: float, counts: tuple[int, int, int] =
     root = float(loads[(grid.fin == 0) & ~grid.moving].sum())
     others = float(loads[grid.fin != 0].sum())
     return {
-        "own": abs(own),
-        "root": root / own,
-        "hull": hull / own,
-        "others": others / own,
-        "force": 1.0 + (root + hull + others) / own,
+        "own": abs(on_plane),
+        "root": root / on_plane,
+        "hull": hull / on_plane,
+        "others": others / on_plane,
+        "force": 1.0 + (root + hull + others) / on_plane,
         "roll": float(turning.sum() / turning[plane].sum()),
-        "incidence": float(in_flow[plane].sum() / own),
+        "incidence": float(in_flow[plane].sum() / on_plane),
     }
 
 
@@ -174,14 +174,14 @@ def carry_over(vehicle: Vehicle) -> CarryOver:
     edges = np.array([roots["LE_root_x_m"].mean(), roots["TE_root_x_m"].mean()])
     radii = [float(np.ravel(hull.radius(edges[i : i + 1], np.array([np.pi / 4.0])))[0]) for i in (0, 1)]
     middle = float(np.mean(radii))
-    found = [stern_factors(_stern_fins(foils, g, a), a) for g, a in ((0.5, r) for r in radii)]
-    found += [stern_factors(_stern_fins(foils, g, middle), middle) for g in (0.0, 1.0)]
+    factors = [stern_factors(_stern_fins(foils, g, a), a) for g, a in ((0.5, r) for r in radii)]
+    factors += [stern_factors(_stern_fins(foils, g, middle), middle) for g in (0.0, 1.0)]
     best = stern_factors(_stern_fins(foils, 0.5, middle), middle)
     coarse = stern_factors(_stern_fins(foils, 0.5, middle), middle, _COARSE)
 
     def sigma(key: str) -> float:
         # Each pair spans what is possible: a quarter of it is one standard deviation.
-        halves = [0.25 * abs(found[i][key] - found[i + 1][key]) for i in (0, 2)]
+        halves = [0.25 * abs(factors[i][key] - factors[i + 1][key]) for i in (0, 2)]
         return float(np.sqrt(halves[0] ** 2 + halves[1] ** 2 + (best[key] - coarse[key]) ** 2))
 
     plane = foils[foils.index.str.startswith("sail_plane")].iloc[0]

@@ -85,14 +85,14 @@ def vortex_pair(point: Array, start: Array, half: float, circulation: float) -> 
 
 def slopes(rows: pd.DataFrame, part: str, depth: float, speed: float) -> dict[str, float]:
     """Measured change of each load coefficient of a plane per radian of its deflection."""
-    own = rows[(rows["part"] == part) & (rows["depth_m"] == depth) & (rows["speed_mps"] == speed)]
-    found = {}
-    for output, group in own.groupby("output"):
+    at_state = rows[(rows["part"] == part) & (rows["depth_m"] == depth) & (rows["speed_mps"] == speed)]
+    slope_of = {}
+    for output, group in at_state.groupby("output"):
         value = group.set_index("delta_deg")["value"]
         if {-_LINEAR_DEG, _LINEAR_DEG} <= set(value.index):
             change = float(value[_LINEAR_DEG] - value[-_LINEAR_DEG])
-            found[str(output)] = change / (2.0 * np.radians(_LINEAR_DEG))
-    return found
+            slope_of[str(output)] = change / (2.0 * np.radians(_LINEAR_DEG))
+    return slope_of
 
 
 def _tip(vehicle: Vehicle) -> float:
@@ -105,8 +105,8 @@ def _tip(vehicle: Vehicle) -> float:
         if part.kind != "foils":
             continue
         table = pd.read_csv(Path(where).parent / part.offsets)
-        own = table[table["name"].str.startswith("sail_plane")]
-        spans += list(0.5 * (own["LE_tip_s_m"] + own["TE_tip_s_m"]))
+        of_sail = table[table["name"].str.startswith("sail_plane")]
+        spans += list(0.5 * (of_sail["LE_tip_s_m"] + of_sail["TE_tip_s_m"]))
     if not spans:
         raise InputError(where, "no sail planes among the foils", "foils named sail_plane...")
     return float(np.mean(spans))
@@ -117,8 +117,8 @@ def _coefficient_changes(
 ) -> tuple[dict[str, float], dict[str, float], dict[str, float]]:
     """Own slopes of the sail planes, what the tail adds per radian, incidence by plane."""
     depth, speed = at
-    own = slopes(rows, sail.name, depth, speed)
-    lift = -own["Z"]
+    by_runs = slopes(rows, sail.name, depth, speed)
+    lift = -by_runs["Z"]
     circulation = 0.5 * length**2 * lift / (2.0 * half)
     added, incidence = {"Z": 0.0, "M": 0.0}, {}
     for plane in tails:
@@ -127,7 +127,7 @@ def _coefficient_changes(
         answer = slopes(rows, plane.name, depth, speed)
         for output in added:
             added[output] += answer[output] * incidence[plane.name]
-    return own, added, incidence
+    return by_runs, added, incidence
 
 
 def tail_downwash(vehicle: Vehicle, rows: pd.DataFrame, planes: CarryOver) -> TailDownwash:
@@ -151,8 +151,8 @@ def tail_downwash(vehicle: Vehicle, rows: pd.DataFrame, planes: CarryOver) -> Ta
     runs = rows[rows["part"] == "sail_planes"]
     at = (float(runs["depth_m"].max()), float(runs["speed_mps"].max()))
     half = _ROLLED_UP * _tip(vehicle)
-    own, added, incidence = _coefficient_changes(rows, tails, sails[0], half, vehicle.particulars.length.value, at)
-    change = {k: planes.force_factor * added[k] / own[k] for k in added}
+    by_runs, added, incidence = _coefficient_changes(rows, tails, sails[0], half, vehicle.particulars.length.value, at)
+    change = {k: planes.force_factor * added[k] / by_runs[k] for k in added}
     factor = {k: planes.sail_factor * (1.0 + x) for k, x in change.items()}
     sigma = {k: float(np.hypot(abs(x) * _RELATIVE_SIGMA, planes.sail_sigma)) for k, x in change.items()}
     return TailDownwash(

@@ -70,11 +70,11 @@ def extrapolation(draft: Draft) -> str:
     speed = float(np.nanmax(draft.axis("U"))) if np.isfinite(draft.axis("U")).any() else np.nan
     said = []
     for term in vehicle_terms(draft.vehicle):
-        found = _axis(term, speed, length) if np.isfinite(speed) else None
+        reached = _axis(term, speed, length) if np.isfinite(speed) else None
         chosen = draft.where([_escaped(term.name)])
-        if found is None or not chosen.any():
+        if reached is None or not chosen.any():
             continue
-        axis, far = found
+        axis, far = reached
         place = np.abs(draft.axis(axis))
         inside = chosen & (place > 0.0)
         if not inside.any():

@@ -55,12 +55,12 @@ def from_lines(draft: Draft, given: Given) -> str:
         raise NotApplicable("the set is as its authors give it")
     try:
         by_part = draft.where(["[YZ]_d*"]).any()
-        found, hull = derivatives(draft.vehicle, with_fins=not by_part), lines(draft.vehicle)
+        known, hull = derivatives(draft.vehicle, with_fins=not by_part), lines(draft.vehicle)
     except InputError as error:
         raise NotApplicable(str(error)) from error
     named = {t.name: t for t in vehicle_terms(draft.vehicle)}
     done: list[str] = []
-    for name, one in found.items():
+    for name, one in known.items():
         table = _TABLES.get(name, ("", ""))[0]
         if name in named and not draft.has(name):
             _add(draft, name, [{}], np.array([one.value]), {c: np.array([x]) for c, x in one.errors.items()})

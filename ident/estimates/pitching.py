@@ -32,17 +32,17 @@ def pure_pitch(draft: Draft, given: Given) -> str:
     if not draft.has("M_q|q|") or not draft.has("Z_uvw"):
         raise NotApplicable("no pure pitch, or no runs in heave to take a drag coefficient from")
     hull = hull_strips(draft, vertical=True)
-    own = drag_from_drift(draft, hull, "Z_uvw", "alpha", "beta")
+    by_runs = drag_from_drift(draft, hull, "Z_uvw", "alpha", "beta")
     literature = literature_drag(hull)
-    drag = weighted_mean([literature, weighted_mean(own)]) if own else literature
+    drag = weighted_mean([literature, weighted_mean(by_runs)]) if by_runs else literature
     length = draft.vehicle.particulars.length.value
     force, moment = (float(x[0]) for x in integrals(hull, 0.0))
     # w - x q = -x q: the force turns its sign.
     for pure, arm, unit in (("Z_q|q|", "Z_uq", force / length**4), ("M_q|q|", "M_uq", -moment / length**5)):
         _by_cross_flow(draft, given, pure, arm, drag, unit)
     text = f"Cd {drag[0]:.2f} +- {drag[1]:.2f}"
-    if own:
-        runs = weighted_mean(own)
+    if by_runs:
+        runs = weighted_mean(by_runs)
         text += (
             f" (runs in heave {runs[0]:.2f} +- {runs[1]:.2f}, literature {literature[0]:.2f} +- {literature[1]:.2f})"
         )

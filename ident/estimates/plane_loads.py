@@ -34,15 +34,15 @@ def lift_slope(draft: Draft, planes: CarryOver) -> tuple[float, float, float]:
     at = rows[rows["part"].str.startswith("stern_plane")]
     depth, speed = float(at["depth_m"].max()), float(at["speed_mps"].max())
     length = draft.vehicle.particulars.length.value
-    found = []
+    measured_slopes = []
     for plane in draft.vehicle.planes:
-        own = slopes(rows, plane.name, depth, speed) if plane.name.startswith("stern_plane") else {}
-        if {"Y", "Z"} <= set(own):
-            along = plane.lift_axis[1] * own["Y"] + plane.lift_axis[2] * own["Z"]
-            found.append(abs(along) * length**2 / planes.area)
-    if not found:
+        of_plane = slopes(rows, plane.name, depth, speed) if plane.name.startswith("stern_plane") else {}
+        if {"Y", "Z"} <= set(of_plane):
+            along = plane.lift_axis[1] * of_plane["Y"] + plane.lift_axis[2] * of_plane["Z"]
+            measured_slopes.append(abs(along) * length**2 / planes.area)
+    if not measured_slopes:
         raise NotApplicable("no stern plane with runs on both sides of its neutral angle")
-    measured = float(np.mean(found))
+    measured = float(np.mean(measured_slopes))
     used = at[at["coefficient"].str.match("[YZ]_d") & (at["value"] != 0.0) & (at["stderr"] > 0.0)]
     runs = float((used["stderr"] / used["value"].abs()).median()) * measured
     theory, wide = _VISCOUS * planes.lift_slope, _LATTICE * planes.lift_slope
@@ -55,9 +55,9 @@ def _planes(draft: Draft) -> CarryOver:
     """Carry-over of the draft's vehicle, computed once."""
     if "carry_over" not in draft.memo:
         draft.memo["carry_over"] = carry_over(draft.vehicle)
-    found = draft.memo["carry_over"]
-    assert isinstance(found, CarryOver)
-    return found
+    planes = draft.memo["carry_over"]
+    assert isinstance(planes, CarryOver)
+    return planes
 
 
 def carried_over(draft: Draft) -> str:
@@ -75,14 +75,14 @@ def carried_over(draft: Draft) -> str:
     if not draft.where(["Z_d*", "Y_d*"], _STERN).any():
         raise NotApplicable("no loads of stern planes by part")
     try:
-        found = _planes(draft)
+        planes = _planes(draft)
     except InputError as error:
         raise NotApplicable(str(error)) from error
-    lift, wide, measured = lift_slope(draft, found)
-    force, roll = found.force_factor, found.roll_factor
+    lift, wide, measured = lift_slope(draft, planes)
+    force, roll = planes.force_factor, planes.roll_factor
     for terms, factor, sigma, unknown in (
-        (["[YZMN]_d*"], lift * force, lift * found.force_sigma, "carry_over force"),
-        (["K_d*"], lift * roll, lift * found.roll_sigma, "carry_over roll"),
+        (["[YZMN]_d*"], lift * force, lift * planes.force_sigma, "carry_over force"),
+        (["K_d*"], lift * roll, lift * planes.roll_sigma, "carry_over roll"),
     ):
         chosen = draft.where(terms, _STERN)
         by_lift = np.where(chosen, draft.value, 0.0) * factor / lift * wide
@@ -91,9 +91,9 @@ def carried_over(draft: Draft) -> str:
     drag, spread = 0.5 * (1.0 + force), float((force - 1.0) / np.sqrt(12.0))
     draft.multiply(draft.where(["X_d*"], _STERN), drag, spread, "carry_over drag", f"carry_over x{drag:.3f}")
     return (
-        f"lift slope {measured:.2f} by runs and {_VISCOUS * found.lift_slope:.2f} by lattice: "
+        f"lift slope {measured:.2f} by runs and {_VISCOUS * planes.lift_slope:.2f} by lattice: "
         f"x{lift:.3f} +- {wide:.3f}; "
-        f"force x{force:.3f} +- {found.force_sigma:.3f}, roll x{roll:.3f} +- {found.roll_sigma:.3f}, "
+        f"force x{force:.3f} +- {planes.force_sigma:.3f}, roll x{roll:.3f} +- {planes.roll_sigma:.3f}, "
         f"drag x{drag:.2f} +- {spread:.2f}"
     )
 
@@ -110,22 +110,22 @@ def sail_planes(draft: Draft) -> str:
     if not chosen.any():
         raise NotApplicable("no loads of sail planes by part")
     try:
-        found = tail_downwash(draft.vehicle, draft.rows, _planes(draft))
+        downwash = tail_downwash(draft.vehicle, draft.rows, _planes(draft))
     except (InputError, KeyError) as error:
         raise NotApplicable(str(error)) from error
-    force, moment = float(found.force_factor), float(found.moment_factor)
+    force, moment = float(downwash.force_factor), float(downwash.moment_factor)
     draft.multiply(
         draft.where(["Z_d*"], ["sail_planes"]),
         force,
-        found.force_sigma,
+        downwash.force_sigma,
         "tail_downwash force",
         f"downwash x{force:.3f}",
     )
     draft.multiply(
         draft.where(["M_d*"], ["sail_planes"]),
         moment,
-        found.moment_sigma,
+        downwash.moment_sigma,
         "tail_downwash moment",
         f"downwash x{moment:.3f}",
     )
-    return f"heave x{force:.3f} +- {found.force_sigma:.3f}, pitch x{moment:.3f} +- {found.moment_sigma:.3f}"
+    return f"heave x{force:.3f} +- {downwash.force_sigma:.3f}, pitch x{moment:.3f} +- {downwash.moment_sigma:.3f}"

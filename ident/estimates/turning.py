@@ -77,7 +77,7 @@ def drag_from_drift(draft: Draft, hull: Strips, term: str, axis: str, other: str
     chosen = draft.where([term]) & (angle != 0.0) & (across == 0.0)
     runs = rows[chosen & rows["origin"].eq("measured").to_numpy()]
     area = hull.moment_of_area(0) / draft.vehicle.particulars.length.value**2
-    found = []
+    drags = []
     for _, group in runs.groupby(["speed_mps", "depth_m"]):
         one = drift_drag(
             np.radians(group[f"{axis}_deg"].to_numpy(float)),
@@ -85,8 +85,8 @@ def drag_from_drift(draft: Draft, hull: Strips, term: str, axis: str, other: str
             group["stderr"].to_numpy(float),
         )
         if one is not None:
-            found.append((-one[0] / area, one[1] / area))
-    return found
+            drags.append((-one[0] / area, one[1] / area))
+    return drags
 
 
 def _add_coupling(draft: Draft, hull: Strips, drag: tuple[float, float], vertical: bool) -> None:
@@ -132,13 +132,13 @@ def cross_flow(draft: Draft, given: Given) -> str:
         if draft.has(*runs) or not draft.has(term):
             continue
         hull = hull_strips(draft, vertical)
-        literature, own = literature_drag(hull), drag_from_drift(draft, hull, term, axis, other)
+        literature, by_runs = literature_drag(hull), drag_from_drift(draft, hull, term, axis, other)
         # The Birge ratio looks at the runs alone: the literature's range is not a repeat of them.
-        drag = weighted_mean([literature, weighted_mean(own)]) if own else literature
+        drag = weighted_mean([literature, weighted_mean(by_runs)]) if by_runs else literature
         _add_coupling(draft, hull, drag, vertical)
         text = f"{'vertical' if vertical else 'horizontal'} Cd {drag[0]:.2f} +- {drag[1]:.2f}"
-        if own:
-            text += f" (runs in drift {weighted_mean(own)[0]:.2f} +- {weighted_mean(own)[1]:.2f}"
+        if by_runs:
+            text += f" (runs in drift {weighted_mean(by_runs)[0]:.2f} +- {weighted_mean(by_runs)[1]:.2f}"
             text += f", literature {literature[0]:.2f} +- {literature[1]:.2f})"
         said.append(text)
         if not vertical and given.pure_yaw is not None:
