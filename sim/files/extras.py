@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from importlib import import_module
+from itertools import accumulate
 from typing import Any
 
 from sim.files.errors import InputError
@@ -30,7 +31,8 @@ def library(module: str, extra: str, where: str, name: str = "") -> Any:
     sim.files.errors.InputError: cases: no_such_library is not installed (allowed: pip install 'ident-submarine[cfd]')
     """
     try:
-        return import_module(module)
+        # Packages before what lies in them: a package that is not there hides modules that were loaded before.
+        return [import_module(part) for part in accumulate(module.split("."), "{}.{}".format)][-1]
     except ImportError as error:
         missing = f"{name or module.partition('.')[0]} is not installed"
         raise InputError(where, missing, f"pip install 'ident-submarine[{extra}]'") from error
