@@ -6,7 +6,10 @@ moving mesh), not from the campaign that is under test.
 
 from __future__ import annotations
 
+import io
+import json
 import math
+import re
 import shutil
 from pathlib import Path
 
@@ -14,15 +17,19 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 from foamlib import FoamFieldFile, FoamFile
-from made_lines import surfaces, write_files, write_loads, write_stl
+from made_lines import TEMPLATE, surfaces, write_files, write_loads, write_stl
+from rich.console import Console
 
 import ident
 from ident.captive.campaign import Campaign, read_campaign
 from ident.captive.grids import convergence
 from ident.cfd.matrix import read_matrix
 from ident.cfd.motions import screw
+from ident.cfd.progress import progress
+from ident.cfd.screen import show_progress
 from ident.cli import main
 from ident.identification.identify import identify
+from sim.files.errors import InputError
 
 # The model's, at a scale of 1:2.
 LENGTH = 2.0
@@ -187,6 +194,39 @@ def test_asked_again_the_plan_stops_when_the_errors_are_reached(answered):
     assert again.outstanding == ()
 
 
+def test_runs_shows_what_came_back_and_the_log_of_a_dead_run(answered, tmp_path):
+    folder = tmp_path / "cases"
+    shutil.copytree(answered / "cases", folder, symlinks=True)
+    shutil.copy(answered / "spheroid.toml", tmp_path / "spheroid.toml")
+    (dead, unsettled, *_) = (c for c in read_matrix(folder).cases if c.iterations)
+    place = folder / "cases" / dead.run_id / "fine"
+    shutil.rmtree(place / "postProcessing")
+    (place / "state").write_text("failed simpleFoam\n")
+    log = (
+        "Time = 40\n" + "x\n" * 50 + "--> FOAM FATAL ERROR :\n    Maximum number of iterations exceeded\nFOAM exiting\n"
+    )
+    (place / "log.simpleFoam").write_text(log)
+    place = folder / "cases" / unsettled.run_id / "medium"
+    times = np.arange(1.0, 101.0)
+    rising = np.array([1.0, 1.0, 1.0]) * times[:, None]
+    write_loads(place, unsettled.part, times, rising, rising, np.zeros(3))
+    seen = progress(read_matrix(folder), read_campaign(folder))
+    states = {(s.run_id, s.grid): s for s in seen.states}
+    assert states[dead.run_id, "fine"].word == "died"
+    assert states[dead.run_id, "fine"].share == pytest.approx(0.4)
+    assert states[dead.run_id, "medium"].word == "done"
+    assert list(seen.unconverged) == [unsettled.run_id]
+    commands = [command for command, _ in seen.restart]
+    assert any(f"{dead.run_id}/fine/Allrun" in c for c in commands)
+    assert any(f"{unsettled.run_id}/medium/Allrun 50" in c for c in commands)
+    console = Console(file=io.StringIO(), width=80)
+    show_progress(seen, console)
+    assert "Maximum number of iterations exceeded" in console.file.getvalue()
+    assert json.loads(json.dumps(seen.to_dict()))["unconverged"] == seen.unconverged
+    # The dead run is awaited, and the rest is fitted.
+    assert not read_campaign(folder).runs["run_id"].str.startswith(dead.run_id).any()
+
+
 def test_a_batch_that_is_not_back_is_not_planned_twice(written, tmp_path):
     folder = tmp_path / "lines"
     shutil.copytree(written, folder, symlinks=True)
@@ -197,6 +237,52 @@ def test_a_batch_that_is_not_back_is_not_planned_twice(written, tmp_path):
     cases = before.cases if batch.matrix is None else batch.matrix.cases
     states = [(c.test, c.part, *sorted(c.state.items())) for c in cases]
     assert len(set(states)) == len(states)
+
+
+# -- oscillation -------------------------------------------------------------------------------------
+
+
+def test_an_oscillating_mesh_gives_added_mass_about_the_moving_origin(tmp_path):
+    folder = write_files(tmp_path)
+    template = TEMPLATE.replace("[steady]", '[unsteady]\nkind = "oscillation"\nperiods = 4\n[steady]')
+    (folder / "template.toml").write_text(template)
+    (folder / "facility.toml").write_text(
+        (folder / "facility.toml")
+        .read_text()
+        .replace("exclude = [", 'exclude = ["towing", "drift_horizontal", "plane_deflection", "rotating_arm", ')
+    )
+    out = folder / "cases"
+    ident.plan_cases(
+        folder / "captive", folder / "hull.stl", folder / "template.toml", out, 0.1, folder / "facility.toml"
+    )
+    for case in read_matrix(out).cases:
+        place = out / "cases" / case.run_id
+        name = next(q for q in case.state if q.endswith("dot") and case.state[q])
+        times = np.linspace(0.0, case.duration, 161)
+        axis = "uvw".find(name[0])
+        # The grids of a case move alike.
+        constant = place / case.grids[0] / "constant"
+        if case.kind == "moving":
+            given = FoamFile(constant / "dynamicMeshDict")["oscillatingLinearMotionCoeffs"]
+            amplitude, omega = float(given["amplitude"][axis]), float(given["omega"])
+        else:
+            # A table of hundreds of rows takes a parser of everything long.
+            text = (constant / "MRFProperties").read_text()
+            omega = 2.0 * math.pi * case.frequency_hz
+            amplitude = float(re.search(r"table\s*\(\s*\(\s*0(?:\.0)?\s+(\S+?)\s*\)", text)[1]) / omega
+        at = amplitude * np.sin(omega * times)
+        force, moment = accelerated_loads(name, 1.0)
+        force, moment = (-(omega**2) * at[:, None] * one for one in (force, moment))
+        if case.kind == "moving":
+            # A steady side load whose arm about the fixed point of the file goes with the body.
+            force = force + np.array([0.0, 0.0, 0.4])
+            moment = moment + np.cross(at[:, None] * np.eye(3)[axis], force)
+        for grid in case.grids:
+            write_loads(place / grid, case.part, times, force, moment, np.zeros(3))
+    found = identify(read_campaign(out))
+    values = {n.name: v for n, v in zip(found.nodes, found.values, strict=True)}
+    for name, value in ADDED.items():
+        assert values[name] == pytest.approx(value, rel=2e-3), name
 
 
 # -- what is said before a case is written -----------------------------------------------------------
@@ -319,3 +405,15 @@ def test_grids_that_do_not_converge_say_so():
     swinging = convergence(1.0, 1.1, 0.8, 1.4)
     assert (swinging.kind, swinging.uncertainty) == ("oscillatory", pytest.approx(0.15))
     assert convergence(1.0, 2.0, 2.1, 1.4).uncertainty == pytest.approx(3.0 * 1.1)
+
+
+def test_coarser_grids_that_are_missing_are_named(answered, tmp_path):
+    folder = tmp_path / "cases"
+    shutil.copytree(answered / "cases", folder, symlinks=True)
+    shutil.copy(answered / "spheroid.toml", tmp_path / "spheroid.toml")
+    path = folder / "campaign.toml"
+    path.write_text(path.read_text().replace("awaited = true", "awaited = false"))
+    first = read_matrix(folder).cases[0].run_id
+    shutil.rmtree(folder / "cases" / first / "coarse" / "postProcessing")
+    with pytest.raises(InputError, match=r"source\.grids"):
+        read_campaign(folder)

@@ -14,6 +14,7 @@ import numpy as np
 import pandas as pd
 
 from ident.captive.campaign_file import CampaignFile
+from ident.captive.oscillation import PHASES
 from ident.captive.other_loads import as_measured
 from ident.captive.quantities import TAKEN
 from ident.captive.run_table import DIRECT, MOTION, excluded
@@ -168,12 +169,19 @@ def to_full_scale(runs: pd.DataFrame, ratio: float) -> pd.DataFrame:
     return scaled
 
 
+def _opposed(names: pd.Series) -> pd.Series:
+    """A name in common of the two opposed instants of an oscillation; missing for other runs."""
+    return (names.str[:-2] + names.str[-1]).where(names.str[-2:].isin(list(PHASES)))
+
+
 def standard_errors(runs: pd.DataFrame, header: CampaignFile, length: float) -> pd.DataFrame:
     """Add s_X..s_N and s_KT, s_KQ, s_t by the campaign's rule.
 
     A standard error that the file gives stands. One that a reduction found is of the mean
     alone; where the run also has ``rel_sigma``, the two are added in squares. ``rel_sigma``
-    is relative to the load as measured, before the model's own inertia is taken off.
+    is relative to the load as measured, before the model's own inertia is taken off; of the two
+    opposed instants of an oscillation it is that of the larger: what a record is off by as a whole
+    then leaves the amplitude between them as it is.
     """
     out = runs.copy()
     quality = out["quality"].map({k: q.factor for k, q in header.quality.items()}).astype(float)
@@ -188,10 +196,12 @@ def standard_errors(runs: pd.DataFrame, header: CampaignFile, length: float) -> 
     rate2 = sum(out[c].fillna(0.0) ** 2 for c in ("p", "q", "r"))
     dynamic = out["U"].fillna(0.0) ** 2 + rate2 * length**2
     reduced = out["reduction"] != ""
+    opposed = _opposed(out["run_id"].astype(str))
     for name in (*OUTPUTS, *DIRECT):
         size = as_measured(out, name)
         if f"size_{name}" in out:
             size = size.where(out[f"size_{name}"].isna(), out[f"size_{name}"])
+        size = size.where(opposed.isna(), size.groupby([out["file"], out["row"], opposed]).transform("max"))
         prime = (size / dynamic).where(dynamic > 0) if name in OUTPUTS else size
         # An excluded load is no measure of what the others can be read to.
         prime = prime.where(~excluded(out, name))
