@@ -12,7 +12,6 @@ import hashlib
 import os
 from dataclasses import dataclass, field
 from functools import cache
-from importlib.resources import files
 from pathlib import Path
 
 import numpy as np
@@ -32,6 +31,7 @@ from ident.captive.conversions import (
     whole_model,
 )
 from ident.captive.histories import Reduced
+from ident.captive.known_tests import tests
 from ident.captive.other_loads import tare_applies, without_hydrostatics, without_inertia, without_tare
 from ident.captive.readers.opening import inputs
 from ident.captive.run_table import DIRECT, MEASURED, NUMBERS, run_table, sigma
@@ -96,12 +96,6 @@ class Campaign:
 
 
 @cache
-def tests() -> pd.DataFrame:
-    """Known captive tests by name: stage, required quantities, loads without which a boat is none, meaning."""
-    with (files("ident") / "data" / "tests.csv").open(encoding="utf-8") as stream:
-        return pd.read_csv(stream, keep_default_na=False).set_index("test")
-
-
 def _digest(path: Path) -> str:
     try:
         with path.open("rb") as stream:

@@ -13,13 +13,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
-from scipy.optimize import minimize_scalar
 
 from ident.captive.source import MOTIONS
+
+if TYPE_CHECKING:
+    from scipy.interpolate import CubicSpline
 from sim.boat.catalogue import OUTPUTS
 
 Array = NDArray[np.float64]
@@ -77,6 +79,10 @@ def of_loads(
     inside = (t > t[0] + 0.5 * period) & (t < t[-1] - 0.5 * period)
     if np.median(np.diff(t)) > period / _PER_PERIOD or inside.sum() < 4 * _PER_PERIOD:
         return None
+    # Few records need them, and they are slow to load.
+    from scipy.interpolate import CubicSpline
+    from scipy.optimize import minimize_scalar
+
     moved = CubicSpline(t, _means(values[:, names.index("displacement")], step, n))
     root = np.sqrt(w[inside] / w[inside].mean())
     y = np.stack([_means(values[:, names.index(o)], step, n)[inside] * root for o in loads], axis=1)

@@ -12,7 +12,7 @@ from importlib.resources import files
 import numpy as np
 import pandas as pd
 
-from ident.captive.campaign import tests
+from ident.captive.known_tests import tests
 from ident.captive.published import TEST as PUBLISHED
 from ident.captive.run_table import PROPULSION
 from ident.checks.findings import Evidence, Finding, Rule, check, kept, rules

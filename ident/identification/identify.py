@@ -20,7 +20,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from ident.captive.campaign import Campaign, tests
+from ident.captive.campaign import Campaign
+from ident.captive.known_tests import tests
 from ident.cluster import Spread, here
 from ident.identification.equations import Runs
 from ident.identification.facilities import Between, Left, between, together, widened

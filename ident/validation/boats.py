@@ -8,8 +8,6 @@ from functools import cached_property
 from threading import RLock
 from typing import TYPE_CHECKING
 
-from ident.estimates.ablation import without
-from ident.estimates.draft import measured_rows
 from ident.validation.essentials import refuse_without_essentials
 from sim.boat.coefficients import Coefficients
 from sim.boat.database import Version, last_own, read_rows, versions
@@ -133,6 +131,8 @@ class Fleet:
         key = (-1, vehicle.model_dump_json())
         with self._lock:
             if key not in self._boats:
+                from ident.estimates.draft import measured_rows
+
                 rows = measured_rows(source.rows)
                 self._boats[key] = Boat(vehicle, rows, source.commit, Coefficients(vehicle, rows))
             return self._boats[key]
@@ -152,6 +152,8 @@ class Fleet:
                 commit = last_own(self._history, vehicle.name, number) or self.record
                 refuse_without_essentials(vehicle, rows, commit.metadata, self.db)
                 if self.left_out and number == self.number:
+                    from ident.estimates.ablation import without
+
                     rows = without(vehicle, rows, commit.metadata, self.left_out, "--without")
                 self._boats[key] = Boat(vehicle, rows, commit, Coefficients(vehicle, rows))
             return self._boats[key]

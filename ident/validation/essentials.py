@@ -6,7 +6,7 @@ import json
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-from ident.captive.campaign import tests
+from ident.captive.known_tests import tests
 from sim.boat.parts import vehicle_terms
 from sim.boat.vehicle import Vehicle
 from sim.files.errors import InputError

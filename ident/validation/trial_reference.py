@@ -10,15 +10,11 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ident.timeseries.smoothing import Samples, SmoothPath, smooth
-from ident.trials.channels import plain
-from ident.trials.spec import TrialFile, load_spec
-from ident.trials.trial import Trial, measure_trial, side_of
 from sim.files.errors import InputError
 from sim.files.record import Record, Written
 from sim.files.schema import FrameData
@@ -29,6 +25,11 @@ from sim.flight.reference import Reference, Start
 from sim.flight.reference_table import is_series
 from sim.flight.series import Series, load_reference
 from sim.flight.simulate import CHANNELS
+
+if TYPE_CHECKING:
+    from ident.timeseries.smoothing import SmoothPath
+    from ident.trials.spec import TrialFile
+    from ident.trials.trial import Trial
 
 Array = NDArray[np.float64]
 _PROGRAM = FrameData(x="forward", y="starboard", z="down")
@@ -82,6 +83,8 @@ def referenced(case: Case, where: str) -> Referenced:
             allowed = "a recorded trial as reference.file: no table of source, channel, t, value, unit"
             raise InputError(f"{where}, key reference", f"trial or controls with {given.file}", allowed)
         return Referenced(case, load_reference(case, where))
+    from ident.trials.spec import TrialFile, load_spec
+
     spec = load_spec(folder / given.trial) if given.trial else TrialFile(frame=None)
     return with_trial(case, folder / given.file, spec, given.controls == "recorded")
 
@@ -135,6 +138,8 @@ def with_trial(case: Case, path: Path, spec: TrialFile, recorded: bool) -> Refer
 
 def _measured(case: Case, path: Path, spec: TrialFile) -> Trial:
     """The trial by itself; by the case's maneuver where it does not show one, or not by its rudder."""
+    from ident.trials.trial import measure_trial
+
     fallback = spec.model_copy(update={"maneuver": _maneuver(case)})
     if spec.maneuver or not fallback.maneuver:
         return measure_trial(path, spec)
@@ -177,6 +182,8 @@ def _base(trial: Trial) -> float:
 
 def _depth(trial: Trial) -> str:
     """Whether the depth of the record is that of the sail top."""
+    from ident.trials.channels import plain
+
     return "D0" if plain(trial.recording.headers.get("z", "")).startswith("d0") else "z"
 
 
@@ -248,6 +255,8 @@ def _start(trial: Trial, case: Case) -> dict[str, Any]:
 
 def _commands_differ(case: Case, trial: Trial) -> list[str]:
     """What the record was ordered to do otherwise than the case."""
+    from ident.trials.trial import side_of
+
     said = []
     one = case.command.dH if trial.maneuver.horizontal else case.command.dV
     if one.law != "zigzag" or "zigzag" not in trial.maneuver.kind:
@@ -295,6 +304,8 @@ def _driven(case: Case, trial: Trial) -> tuple[Case | None, list[str]]:
     t = record.abscissa - trial.start.time
     value = record.value
     first = float(value[int(np.argmax(np.abs(value) > 0.5 * float(np.max(np.abs(value)))))])
+    from ident.trials.trial import side_of
+
     sides = {"starboard": 1.0, "bow up": 1.0, "port": -1.0, "bow down": -1.0}
     sign = math.copysign(1.0, first) * sides.get(side_of(trial), 1.0)
     header = trial.recording.headers[name]
@@ -331,6 +342,8 @@ def smoothed(series: Series) -> Series:
 def _if_noisy(record: Record) -> Record | None:
     if len(record) < 30:
         return None
+    from ident.timeseries.smoothing import Samples, smooth
+
     path: SmoothPath = smooth([Samples(record.abscissa, record.value, 0, 0.0)])
     turns = [int(np.count_nonzero(np.diff(np.sign(np.diff(x))))) for x in (record.value, path(record.abscissa))]
     if turns[0] <= _MORE_TURNS * turns[1] + 5:

@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from ident.metrics.measure import measured
 from ident.metrics.metric import Metrics
-from ident.trials.spec import load_spec
 from ident.validation.boats import Boat, Fleet
 from ident.validation.coverage import outside_tables
 from ident.validation.other_boat import Asked, check_answers, for_boat, saturated
@@ -159,6 +158,8 @@ def _with_reference(case: Case, path: Path, frame: str | None, trial: str | os.P
     if not path.is_file():
         raise InputError(str(path), "no such file", "a CSV file: source, channel, t or s, value, unit")
     if trial is not None or not is_series(path):
+        from ident.trials.spec import load_spec
+
         spec = load_spec(Path(trial) if trial else None)
         return with_trial(case, path, spec.model_copy(update={"frame": _FRAMES[frame]}) if frame else spec, False)
     header = path.read_bytes().partition(b"\n")[0].strip().split(b",")

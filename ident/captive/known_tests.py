@@ -1,0 +1,13 @@
+"""The captive tests that the program knows."""
+
+from __future__ import annotations
+
+from importlib.resources import files
+
+import pandas as pd
+
+
+def tests() -> pd.DataFrame:
+    """Known captive tests by name: stage, required quantities, loads without which a boat is none, meaning."""
+    with (files("ident") / "data" / "tests.csv").open(encoding="utf-8") as stream:
+        return pd.read_csv(stream, keep_default_na=False).set_index("test")
