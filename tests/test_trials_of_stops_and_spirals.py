@@ -1,98 +1,83 @@
 """Authority: exact flights. Every maneuver, flown by the simulator and recorded with noise, gives the flight's metrics.
 
-The truth is what ``ident validate`` measures on the flight; the record has the noise of good instruments, 2 Hz, a
-course of 030 and, where it is made under way, half a minute of approach.
+The truth is what ``ident validate`` measures on the flight, by the same names; the record has the noise of good
+instruments, 2 Hz, a course of 030 and, where it is made under way, half a minute of approach. How often the stated
+intervals hold over many records is the table of docs/trials.md, made by ``python tests/trial_flights.py``.
 """
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 import pytest
-from trial_records import turned, write
+from trial_flights import MANEUVERS, approach_of, errors, flown, recorded
 
-from ident.metrics.measure import measured
 from ident.trials.spec import TrialFile
 from ident.trials.trial import measure_trial
-from sim.flight.case import load_case
-from sim.flight.simulate import simulate
 
-COUNT = 40
-NOISE = {"psi [deg]": 0.05, "r [deg/s]": 0.005, "phi [deg]": 0.02, "theta [deg]": 0.02, "u [m/s]": 0.01}
-NOISE |= {"depth [m]": 0.02, "x_north [m]": 0.3, "y_east [m]": 0.3, "rudder [deg]": 0.02, "plane [deg]": 0.02}
+# What a metric may be off by and still be of use, by its unit: shares of the value, and that much.
+SHARE, LEAST = 0.05, {"deg": 0.1, "s": 1.0, "m": 1.0, "deg/s": 0.03, "m/s": 0.02, "%": 1.0, "-": 0.02}
+# The first overshoot out of the band of 5 % is 4.8 % of the step: noise decides when it has settled.
+UNDECIDED = {"settling_5_percent_s", "pitch_rate_peak_at_s"}
+IN_MINUTES = ("hzz20", "turning-circle")  # test_trials_give_the_exact_flight.py has these
 
 
 @pytest.fixture(scope="module")
-def flown(coefficients):
-    """Case name -> the flight and its metrics."""
+def flight_of(coefficients):
     known = {}
 
     def fly(name):
         if name not in known:
-            case, reference = load_case(name)
-            flight = simulate(case, coefficients)
-            metrics = measured(case, flight, reference, {}).metrics
-            known[name] = flight, {k: v["simulated"] for k, v in metrics.items() if v.get("simulated") is not None}
+            known[name] = flown(name, coefficients)
         return known[name]
 
     return fly
 
 
-def recorded(flight, folder, seed: int = 1, approach: float = 30.0):
-    """The flight as a trial: program channels with noise, at 2 Hz."""
-    rng = np.random.default_rng(seed)
-    # Twice a second; of spirals, which take hours, some thousand samples.
-    step = max(1, round(0.5 / (flight["t"][1] - flight["t"][0])), flight["t"].size // 2500)
-    pick = np.arange(0, flight["t"].size, step)
-    t = flight["t"][pick]
-    before = np.arange(0.0, approach, t[1] - t[0])
-    speed = float(flight["u"][0])
-
-    def joined(name, first=None, factor=1.0):
-        values = flight[name][pick] * factor
-        return np.concatenate([np.full(before.size, values[0] if first is None else first), values])
-
-    x = np.concatenate([speed * (before - approach), flight["x"][pick]])
-    north, east = turned(x, joined("y"), 30.0, (100.0, -50.0))
-    degrees = math.degrees(1.0)
-    columns = {"time [s]": np.concatenate([before, approach + t])}
-    columns |= {"psi [deg]": joined("psi", factor=degrees) + 30.0, "r [deg/s]": joined("r", factor=degrees)}
-    columns |= {"phi [deg]": joined("phi", factor=degrees), "theta [deg]": joined("theta", factor=degrees)}
-    columns |= {"u [m/s]": joined("u"), "depth [m]": joined("z"), "x_north [m]": north, "y_east [m]": east}
-    columns |= {"rudder [deg]": joined("dH", 0.0, degrees), "plane [deg]": joined("dV", factor=degrees)}
-    columns |= {"n [rpm]": joined("n", float(flight["n"][0]), 60.0)}
-    n = columns["time [s]"].size
-    noisy = {k: v + NOISE.get(k, 0.0) * rng.standard_normal(n) for k, v in columns.items()}
-    return write(folder / "record.csv", noisy)
+@pytest.mark.parametrize("name", [n for n in MANEUVERS if n not in IN_MINUTES])
+def test_the_record_gives_the_flights_metrics_within_their_errors(flight_of, tmp_path, name):
+    one = flight_of(name)
+    words, stated = MANEUVERS[name]
+    spec = TrialFile(maneuver=words, execute_s=approach_of(one), **stated)
+    metrics = measure_trial(recorded(one, tmp_path, 100), spec, 20).metrics
+    assert len(one.truth) >= 2
+    for metric, value in one.truth.items():
+        found = metrics[metric]
+        assert abs(found.value - value) < 4.0 * found.sigma, (metric, value, found)
+        if metric not in UNDECIDED:
+            assert found.sigma < SHARE * abs(value) + LEAST[found.unit], (metric, found)
 
 
-CASES = {
-    "crash-stop": ("stopping", ("time_to_stop_s", "track_reach_m", "head_reach_m", "lateral_deviation_m")),
-    "direct-spiral": ("direct spiral", ("yaw_rate_+20_deg_down_degps", "yaw_rate_-5_deg_up_degps")),
-}
+@pytest.mark.parametrize("name", ["vzz10-10kt", "max-q"])
+def test_stated_intervals_hold_over_several_records(flight_of, tmp_path, name):
+    away = np.array([list(z.values()) for z in errors(flight_of(name), tmp_path, range(200, 204), 20)])
+    # Metrics of one record share their errors: 95 % of a few records is 4 in 5 here.
+    assert np.mean(np.abs(away) < 1.96) >= 0.8
+    assert 0.4 < np.sqrt(np.mean(away**2)) < 1.5
+    assert np.abs(away).max() < 4.5
 
 
-@pytest.mark.parametrize("name", CASES)
-def test_the_record_gives_the_flights_metrics_within_their_errors(flown, tmp_path, name):
-    maneuver, wanted = CASES[name]
-    flight, truth = flown(name)
-    at_rest = float(flight["u"][0]) == 0.0
-    path = recorded(flight, tmp_path, approach=0.0 if at_rest else 30.0)
-    step = case_step(name)
-    spec = TrialFile(maneuver=maneuver, execute_s=0.0 if at_rest else 30.0, step_m=step)
-    found = measure_trial(path, spec, COUNT)
-    names = [n for n in wanted if n in truth]
-    assert names, sorted(truth)
-    for one in names:
-        assert one in found.metrics, (one, sorted(found.metrics))
-        away = found.metrics[one].value - truth[one]
-        assert abs(away) < 3.5 * found.metrics[one].sigma, (one, truth[one], found.metrics[one])
-        assert found.metrics[one].sigma < 0.2 * abs(truth[one]) + 0.6, (one, found.metrics[one])
+def test_a_rise_ends_where_the_nose_comes_to_the_surface(flight_of, tmp_path):
+    """A point above the nose comes up before the record ends."""
+    one = flight_of("max-q")
+    path = recorded(one, tmp_path, 7)
+    point = (32.33, 0.0, -3.0)
+    spec = TrialFile(maneuver="rise", execute_s=30.0, surface_point_m=point)
+    flight = one.flight
+    depth = flight["z"] - np.sin(flight["theta"]) * point[0] + np.cos(flight["theta"]) * point[2]
+    below = int(np.argmax(depth <= 0.0))
+    assert depth[below] <= 0.0
+    exact = np.interp(0.0, -depth[below - 1 : below + 1], flight["t"][below - 1 : below + 1])
+    found = measure_trial(path, spec, 20).metrics["nose_at_surface_s"]
+    assert abs(found.value - exact) < 3.5 * found.sigma < 1.0
 
 
-def case_step(name):
-    """Ordered change of depth of a case, where it has one."""
-    case, _ = load_case(name)
-    steps = case.command.dV.step
-    return steps[-1].distance_m if case.maneuver == "depth_change" and steps else None
+def test_pitch_counts_from_level_or_from_the_trim_by_which_the_planes_are_reversed(flight_of, tmp_path):
+    """The boat is trimmed by half a degree; its planes are reversed at ten degrees from level."""
+    one = flight_of("vzz10-10kt")
+    path = recorded(one, tmp_path, 3)
+    spec = TrialFile(maneuver="vertical zigzag 10/10", execute_s=30.0)
+    done = measure_trial(path, spec, 10)
+    assert any("pitch counts from level: plane" in text for text in done.assumed)
+    trimmed = TrialFile.model_validate(spec.model_dump() | {"initial": {"pitch_deg": -0.47}})
+    other = measure_trial(path, trimmed, 10).metrics["overshoot_1_deg"].value
+    assert other - done.metrics["overshoot_1_deg"].value == pytest.approx(0.47, abs=0.05)

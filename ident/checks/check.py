@@ -22,6 +22,7 @@ from ident.captive.readers.sheet import run_cells
 from ident.captive.source import Source
 from ident.checks import axes as checks_axes
 from ident.checks import copies as checks_copies
+from ident.checks import fitted as checks_fitted
 from ident.checks import histories as checks_histories
 from ident.checks import lines as checks_lines
 from ident.checks import physics as checks_physics
@@ -43,6 +44,7 @@ if TYPE_CHECKING:
 _MODULES = (
     checks_axes,
     checks_copies,
+    checks_fitted,
     checks_histories,
     checks_lines,
     checks_physics,
@@ -187,13 +189,16 @@ def check_campaign(
     if campaign.members:
         return _of_several(campaign, folder, identified or identify(campaign), tell)
     evidence = evidence_of(campaign, folder)
-    if not campaign.vehicle.terms_of.tabulated and not campaign.runs.empty:
-        evidence = replace(evidence, derivatives=constants(identified or identify(campaign)))
+    if not campaign.runs.empty:
+        known = identified or identify(campaign)
+        evidence = replace(evidence, fitted=checks_fitted.residuals(known))
+        if not campaign.vehicle.terms_of.tabulated:
+            evidence = replace(evidence, derivatives=constants(known))
     return run(evidence, tell)
 
 
 # What is asked of several campaigns as a whole; the rest is each one's own.
-_TOGETHER = ("missing", "between_tests", "duplicates", "repeated_blocks", "facilities")
+_TOGETHER = ("missing", "between_tests", "duplicates", "repeated_blocks", "facilities", "residuals")
 
 
 def _of_several(campaign: Campaign, folder: Path | None, identified: Identification, tell: Tell) -> list[Finding]:
@@ -202,9 +207,10 @@ def _of_several(campaign: Campaign, folder: Path | None, identified: Identificat
     for name, one in campaign.members.items():
         own = folder / name if folder is not None and (folder / name).is_dir() else None
         for finding in check_campaign(one, own, tell=tell):
-            if finding.check != "missing":
+            if finding.check not in ("missing", "residuals"):
                 found.append(replace(finding, file=f"{name}/{finding.file}"))
     evidence = replace(evidence_of(campaign), histories=(), between=identified.between)
+    evidence = replace(evidence, fitted=checks_fitted.residuals(identified))
     known = {(f.check, f.file, f.what) for f in found}
     with np.errstate(all="ignore"):
         for name in _TOGETHER:

@@ -154,6 +154,7 @@ class Evidence:
     body : The tested body.
     vehicle : For planes, their mirror and their position.
     campaign : The whole campaign, when the runs are one.
+    fitted : Columns coefficient, part, worst (largest residual of its runs, in their standard errors), run.
     derivatives, reference : Columns coefficient, value, file, row; the second in the norm
         the first claims.
     labels : Columns sheet, column, description, file, row.
@@ -170,6 +171,7 @@ class Evidence:
     body: Body | None = None
     vehicle: Vehicle | None = None
     campaign: Campaign | None = None
+    fitted: pd.DataFrame | None = None
     derivatives: pd.DataFrame | None = None
     reference: pd.DataFrame | None = None
     labels: pd.DataFrame | None = None

@@ -100,6 +100,22 @@ def loads_without_error(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
             yield rule.finding(str(file), rows_of(bad), columns, what)
 
 
+@check("errors")
+def runs_that_decide_alone(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
+    """A relative error so much smaller than those of its test that the other runs count for nothing."""
+    runs = evidence.runs[evidence.runs["rel_sigma"] > 0.0]
+    for (file, test), group in runs.groupby([together(runs), "test"], sort=False):
+        usual = float(group["rel_sigma"].median())
+        small = group[group["rel_sigma"] < rule.limits["alone"] * usual]
+        if len(group) >= 4 and not small.empty:
+            first = small.iloc[0]
+            what = (
+                f"rel_sigma = {first['rel_sigma']:.4g} of run {first['run_id']} where {usual:.4g} is usual in {test}: "
+            )
+            what += "the others count for nothing beside it"
+            yield rule.finding(str(file), rows_of(small), ["rel_sigma"], what, "warning")
+
+
 @check("zero")
 def loads_that_do_not_act(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
     """Runs of one test and part whose every load is zero."""

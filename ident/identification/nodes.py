@@ -15,7 +15,8 @@ class Node:
     """One unknown tabulated value: coefficient, part, point, and the runs behind it.
 
     ``seen`` holds the (part, point) where runs stood: this one, its mirror image, or both.
-    ``tests`` names the tests of its runs. ``worst`` is the largest disagreement among the runs, in standard errors.
+    ``tests`` names the tests of its runs. ``worst`` is the largest disagreement among the runs, in standard errors,
+    and ``worst_run`` the run that it is of.
     """
 
     name: str
@@ -25,6 +26,7 @@ class Node:
     qualities: list[str] = field(default_factory=list)
     tests: set[str] = field(default_factory=set)
     worst: float = 0.0
+    worst_run: str = ""
     seen: set[tuple[str, Point]] = field(default_factory=set)
 
 

@@ -303,7 +303,9 @@ class Solver:
             node.runs += names[lines].tolist()
             node.qualities += dict.fromkeys(qualities[lines].tolist())
             node.tests |= set(kinds[lines].tolist())
-            node.worst = max(node.worst, float(scores[lines].max(initial=0.0)))
+            if lines.size and float(scores[lines].max()) > node.worst:
+                worst = lines[int(np.argmax(scores[lines]))]
+                node.worst, node.worst_run = float(scores[worst]), str(names[worst])
         for i in np.flatnonzero(scores > 2.0).tolist():
             form = equations.forms[equations.form[i]]
             name = self.nodes[next(iter(form.unknowns))].name

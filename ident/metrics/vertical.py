@@ -89,6 +89,13 @@ def meander(channels: Channels, execute: float | None, pitch: float) -> Metrics:
     return dict(zip(names, values, strict=True)) | {"depth_change_m": float(z[-1] - z[0])}
 
 
+def _crossed(t: Array, x: Array, i: int, level: float) -> float:
+    """When ``x`` passes a level between sample ``i - 1`` and sample ``i`` [s]."""
+    if i == 0 or x[i] == x[i - 1]:
+        return float(t[i])
+    return float(t[i - 1] + (level - x[i - 1]) * (t[i] - t[i - 1]) / (x[i] - x[i - 1]))
+
+
 def depth_change(channels: Channels, step: float, band: float = 0.05) -> Metrics:
     """Step response of the depth.
 
@@ -112,10 +119,12 @@ def depth_change(channels: Channels, step: float, band: float = 0.05) -> Metrics
     over = max(float(share.max()) - 1.0, 0.0)
     change = theta - theta[0]
     return {
-        "reach_90_s": float(t[reached[0]]) if reached.size else None,
+        "reach_90_s": _crossed(t, share, int(reached[0]), 0.9) if reached.size else None,
         "overshoot_m": over * abs(step),
         "overshoot_percent": 100.0 * over,
-        f"settling_{100 * band:g}_percent_s": float(t[outside[-1] + 1]) if settled and outside.size else None,
+        f"settling_{100 * band:g}_percent_s": _crossed(t, np.abs(share - 1.0), int(outside[-1]) + 1, band)
+        if settled and outside.size
+        else None,
         "pitch_peak_deg": float(np.degrees(change[np.argmax(np.abs(change))])),
     }
 
@@ -146,7 +155,7 @@ def course_keeping(channels: Channels, released: float | None, band_deg: float =
     values = (
         float(np.max(np.abs(error))),
         float(max(np.max(-side * error), 0.0)),
-        float(t[outside[-1] + 1] - released) if settled else None,
+        _crossed(t, np.abs(error), int(outside[-1]) + 1, band_deg) - released if settled else None,
         float(np.degrees(np.sqrt(np.mean(channels["dH"][steering] ** 2)))),
         float(channels["y"][-1] - channels["y"][0]),
     )

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ident.timeseries.smoothing import Samples, SmoothPath, smooth
+from ident.trials.body import angle_rate
 from ident.trials.consistency import path_of, regressed
 from ident.trials.maneuvers import Maneuver, control_of, holds, large
 from ident.trials.reading import Recording
@@ -27,7 +28,9 @@ _CLOSE = 0.02
 _ENTRY = math.radians(60.0)
 # A course is steady when it turns by less than this share of the maneuver's largest rate.
 _STEADY = 0.01
-# Share of a body rate by which it may differ from the rate of the angle, along the record.
+# A boat trimmed by less than this is level [rad].
+_LEVEL = math.radians(0.05)
+# Share of a body rate by which it may differ from the rate of the angle, along the record, heel and pitch unknown.
 _BODY_RATE = 0.005
 _NOISE = {"psi": "heading_deg", "theta": "pitch_deg", "phi": "roll_deg", "r": "yaw_rate_degps", "north": "position_m"}
 _NOISE |= {"east": "position_m", "z": "depth_m", "U": "speed_mps", "u": "speed_mps"}
@@ -157,10 +160,42 @@ def start_of(one: Recording, maneuver: Maneuver, spec: TrialFile) -> Start:
         execute = by_control or _onset(record, path_of(record))  # type: ignore[arg-type]
     said.append(execute[2])
     known: tuple[float, float] | None = None
-    if record is not None and maneuver.kind != "roll_decay":
+    if record is not None and maneuver.kind == "vertical_zigzag":
+        known = _pitch(one, record, maneuver, execute[0], spec, said)
+    elif record is not None and maneuver.kind != "roll_decay":
         known = _angle(record, execute[0], angle, spec, said)
     sigma = math.hypot(execute[1], one.time_sigma)
     return Start(execute[0], sigma, known[0] if known else None, known[1] if known else 0.0, tuple(said))
+
+
+def _pitch(
+    one: Recording, record: Record, maneuver: Maneuver, execute: float, spec: TrialFile, said: list[str]
+) -> tuple[float, float]:
+    """Pitch from which a vertical zigzag counts: level, or the trim before it where the planes turn by that."""
+    if spec.initial.pitch_deg is not None:
+        said.append(f"pitch counts from {spec.initial.pitch_deg:g} deg: stated")
+        return math.radians(spec.initial.pitch_deg), 0.0
+    trim = _approach(record, execute, stated_noise(spec, "theta"))
+    control = control_of(one, True)
+    level = "pitch counts from level"
+    if trim is None or abs(trim[0]) < max(_LEVEL, 3.0 * trim[1]):
+        said.append(level)
+        return 0.0, 0.0
+    if control is None or maneuver.check is None:
+        said.append(f"{level}, not from {math.degrees(trim[0]):.2f} deg before the execute; pitch_deg states it")
+        return 0.0, 0.0
+    half = 0.5 * float(np.median(np.diff(control.abscissa)))
+    reversals = [float(record.at(h.end + half)) for h in large(holds(control))[:-1]]
+    away = {
+        base: np.mean([abs(abs(x - base) - math.radians(maneuver.check)) for x in reversals]) for base in (0.0, trim[0])
+    }
+    if not reversals or away[0.0] <= away[trim[0]]:
+        said.append(f"{level}: {one.headers[control.channel]} is reversed at the check angle from there")
+        return 0.0, 0.0
+    said.append(
+        f"pitch counts from {trim[2]}: {one.headers[control.channel]} is reversed at the check angle from there"
+    )
+    return trim[0], trim[1]
 
 
 def _angle(record: Record, execute: float, angle: str, spec: TrialFile, said: list[str]) -> tuple[float, float] | None:
@@ -211,27 +246,56 @@ def _of_revolutions(one: Recording) -> tuple[float, float, str] | None:
 
 def paths(one: Recording, start: Start, spec: TrialFile) -> tuple[dict[str, SmoothPath], list[str]]:
     """Smooth paths of the channels from shortly before the execute on, rates taken with their angles."""
+    taken: dict[str, list[Samples]] = {}
     found: dict[str, SmoothPath] = {}
     said: list[str] = []
     for name, record in one.channels.items():
         if name in ("dH", "dV", "dH_order", "course", "p", "q", "r", "udot", "n", "v", "w"):
             continue
         samples, path = _from_run_up(record, start.time, stated_noise(spec, name))
-        if path is None:
-            continue
-        begin = float(samples[0].time[0])
-        rate = {"psi": "r", "theta": "q", "phi": "p"}.get(name, "")
-        path = smooth(samples)
+        if path is not None:
+            taken[name], found[name] = samples, smooth(samples)
+    alone: dict[str, SmoothPath] = {n: found[n] for n in ("psi", "theta", "phi") if n in found}
+    for name in alone:
+        rate = {"psi": "r", "theta": "q", "phi": "p"}[name]
         if rate in one.channels:
-            more = one.channels[rate].kept(one.channels[rate].abscissa >= begin - 1e-9)
-            joined = _joined(samples, more, path, stated_noise(spec, rate))
-            if joined is not None:
-                path = joined
-                said.append(f"{one.headers[name]} and {one.headers[rate]} taken together: they agree")
+            found |= _with_rate(one, name, rate, taken[name], alone, spec, said)
         if name in ("psi", "theta") and start.angle is None:
-            path = _from_a_steady_course(path, start.time, said)
-        found[name] = path
+            found[name] = _from_a_steady_course(found[name], start.time, said)
+    if "psi" in found and "r" not in found and not {"phi", "theta"} <= set(found):
+        said.append("yaw rates are those of the heading: neither r nor heel and pitch are recorded or agree with it")
     return found, said
+
+
+def _with_rate(
+    one: Recording,
+    name: str,
+    rate: str,
+    samples: list[Samples],
+    alone: dict[str, SmoothPath],
+    spec: TrialFile,
+    said: list[str],
+) -> dict[str, SmoothPath]:
+    """The path through an angle and the rate of its axis, and that of the rate where heel or pitch are unknown."""
+    begin = float(samples[0].time[0])
+    record = one.channels[rate].kept(one.channels[rate].abscissa >= begin - 1e-9)
+    inclined = {"phi", "theta"} <= set(alone)
+    lo = max(float(p.knots[4]) for p in alone.values())
+    hi = min(float(p.knots[-5]) for p in alone.values())
+    record = record.kept((record.abscissa >= lo) & (record.abscissa <= hi))
+    at = record.abscissa
+    values, slopes = {k: p(at) for k, p in alone.items()}, {k: p(at, 1) for k, p in alone.items()}
+    angular = replace(record, value=angle_rate(name, record.value, values, slopes)) if inclined else record
+    found: dict[str, SmoothPath] = {}
+    joined = _joined(samples, angular, alone[name], stated_noise(spec, rate), 0.0 if inclined else _BODY_RATE)
+    if joined is not None:
+        found[name] = joined
+        said.append(f"{one.headers[name]} and {one.headers[rate]} taken together: they agree")
+    if not inclined and rate in ("r", "q") and len(record) >= 16:
+        pair = regressed(at, record.value, slopes[name])
+        if pair is not None and pair.agrees:
+            found[rate] = smooth([Samples(at, record.value, 0, stated_noise(spec, rate))])
+    return found
 
 
 def _from_run_up(record: Record, execute: float, noise: float) -> tuple[list[Samples], SmoothPath | None]:
@@ -261,10 +325,13 @@ def _from_a_steady_course(path: SmoothPath, execute: float, said: list[str]) -> 
     return smooth([replace(path.samples[0], value=path.samples[0].value + path.centre), *path.samples[1:], steady])
 
 
-def _joined(samples: list[Samples], rate: Record, path: SmoothPath, noise: float) -> SmoothPath | None:
-    """The path through an angle and its rate, where the two agree to a hundredth."""
-    lo, hi = samples[0].time[0], samples[0].time[-1]
-    inside = rate.kept((rate.abscissa >= lo) & (rate.abscissa <= hi))
+def _joined(
+    samples: list[Samples], inside: Record, path: SmoothPath, noise: float, body_rate: float
+) -> SmoothPath | None:
+    """The path through an angle and its rate, where the two agree to a hundredth.
+
+    A body rate is not quite the rate of its Euler angle where heel and pitch stand between them: by ``body_rate``.
+    """
     if len(inside) < 16:
         return None
     pair = regressed(inside.abscissa, inside.value, path(inside.abscissa, 1))
@@ -273,7 +340,6 @@ def _joined(samples: list[Samples], rate: Record, path: SmoothPath, noise: float
     if pair is None or abs(pair.slope - 1.0) > _CLOSE or abs(pair.offset) > 6.0 * offset_error + 1e-6:
         return None
     first = Samples(samples[0].time, samples[0].value, 0, samples[0].sigma or path.sigma)
-    # A body rate is not quite the rate of its Euler angle: heel and pitch stand between them.
     value = (inside.value - pair.offset) / pair.slope
-    sigma = math.hypot(noise or own, _BODY_RATE * float(np.sqrt(np.mean(value**2))))
+    sigma = math.hypot(noise or own, body_rate * float(np.sqrt(np.mean(value**2))))
     return smooth([first, Samples(inside.abscissa, value, 1, sigma)])

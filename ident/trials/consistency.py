@@ -26,6 +26,8 @@ _NAMES = {"r": "yaw rate", "p": "roll rate", "q": "pitch rate", "udot": "surge a
 _NAMES |= {"phi": "heel", "theta": "pitch", "u": "speed ahead", "U": "speed"}
 _SAME, _LIKE, _ALIKE = 0.1, 0.06, 0.9
 _MOST_DRIFT = math.radians(40.0)
+# What moves by less than so many standard errors of a sample lies still.
+_SCATTER = 6.0
 # Heading and track of a boat turn by angles that differ by less than this factor.
 _TURNS_ALIKE = 2.0
 
@@ -231,6 +233,22 @@ def _speed_ratio(one: Recording, name: str, ratio: float, at: float) -> list[Fin
     return []
 
 
+def _moving(one: Recording) -> Recording:
+    """The recording without what lies still under its noise: a track at rest, a rate and an angle that do not turn."""
+    still = {name for name in ("psi", "theta", "phi", "r", "p", "q", "north", "east") if _still(one.channels.get(name))}
+    gone = {c for rate, angle in RATES.items() if {rate, angle} <= still for c in (rate, angle)}
+    gone |= {"north", "east"} if {"north", "east"} <= still else set()
+    return one.with_(channels={k: r for k, r in one.channels.items() if k not in gone}) if gone else one
+
+
+def _still(record: Record | None) -> bool:
+    """Whether the smooth path of a channel moves by less than single samples scatter."""
+    if record is None or len(record) < 8:
+        return False
+    path = path_of(record)
+    return float(np.ptp(path(record.abscissa))) < _SCATTER * path.sigma
+
+
 def check_recording(one: Recording) -> list[Finding]:
     """Everything about a recording that two of its channels tell one another.
 
@@ -242,6 +260,7 @@ def check_recording(one: Recording) -> list[Finding]:
     -------
     Findings with file, row, columns and remedy.
     """
+    one = _moving(one)
     angles: list[str] = [a for a in ("psi", "phi", "theta", "u") if a in one.channels and len(one.channels[a]) >= 8]
     slopes = {a: path_of(one.channels[a]) for a in angles}
     return [*_rates(one, slopes), *_track(one)]

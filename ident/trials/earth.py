@@ -107,6 +107,8 @@ def _common(one: Recording, first: str, second: str) -> tuple[Record, Record]:
 def _positions(one: Recording, spec: TrialFile) -> Recording:
     """Track to north and east."""
     channels, headers, said = dict(one.channels), dict(one.headers), list(one.assumed)
+    stated = [v for v in (spec.initial.x_m, spec.initial.y_m) if v is not None]
+    pointing = [_TURNS["north"], _TURNS["east"]]
     if {"lat", "lon"} <= set(channels) and "north" not in channels:
         lat, lon = _common(one, "lat", "lon")
         north, east = tangent_plane(lat.value, np.unwrap(lon.value))
@@ -118,6 +120,7 @@ def _positions(one: Recording, spec: TrialFile) -> Recording:
         named = one.with_(channels=channels)
         x, y = _common(named, "x", "y")
         axes, text = _axes(named, x, y, spec)
+        pointing = axes
         for record, (axis, sign) in zip((x, y), axes, strict=True):
             name = ("north", "east")[axis]
             channels[name] = Record(name, record.abscissa, sign * record.value, "m")
@@ -127,7 +130,23 @@ def _positions(one: Recording, spec: TrialFile) -> Recording:
     if ("north" in channels) != ("east" in channels):
         lone = "north" if "north" in channels else "east"
         raise InputError(f"{one.file}, column {headers[lone]}", "one coordinate of a position", "both, or neither")
-    return one.with_(channels=channels, headers=headers, assumed=tuple(said))
+    place = None
+    if stated:
+        if len(stated) < 2 or "north" not in channels or {"lat", "lon"} & set(one.channels):
+            allowed = "x_m and y_m, with a track in metres that they are a point of; or neither"
+            raise InputError(f"{one.file}, key initial", "a position at the execute", allowed)
+        at = {axis: sign * spec.scale * v for v, (axis, sign) in zip(stated, pointing, strict=True)}
+        place = (at[0], at[1])
+        said.append(f"position at the execute: {stated[0]:g}, {stated[1]:g} m, stated")
+    return one.with_(channels=channels, headers=headers, assumed=tuple(said), place=place)
+
+
+def place_of(one: Recording, spec: TrialFile, execute: float) -> tuple[float, float] | None:
+    """North and east [m] of the stated position at the execute, through the water as the track is."""
+    if one.place is None or spec.current is None or not spec.current.correct:
+        return one.place
+    to, ran = math.radians(spec.current.to_deg), spec.current.speed_mps * execute
+    return one.place[0] - ran * math.cos(to), one.place[1] - ran * math.sin(to)
 
 
 def _axes(one: Recording, x: Record, y: Record, spec: TrialFile) -> tuple[list[tuple[int, float]], str]:

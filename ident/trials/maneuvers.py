@@ -100,11 +100,17 @@ class Hold:
     value: float
 
 
-def holds(record: Record) -> list[Hold]:
-    """The stretches over which a control stays where it is, of three samples or more."""
+def holds(record: Record, share: float = 0.04) -> list[Hold]:
+    """The stretches over which a control stays where it is, of three samples or more.
+
+    Parameters
+    ----------
+    record : Of the rudder, the planes, or an order.
+    share : Of its range, by which it may stray from where it stays; smaller for steps that are.
+    """
     t, x = record.abscissa, record.value
     spread = float(np.percentile(x, 98) - np.percentile(x, 2))
-    tolerance = max(0.04 * spread, 4.0 * MAD_TO_SIGMA * float(np.median(np.abs(np.diff(x)))), math.radians(0.2))
+    tolerance = max(share * spread, 4.0 * MAD_TO_SIGMA * float(np.median(np.abs(np.diff(x)))), math.radians(0.2))
     total = np.concatenate([[0.0], np.cumsum(x)])
     out: list[Hold] = []
     start = 0

@@ -48,6 +48,7 @@ class Recording:
     rows : File row of each time of the record, for findings: (times, rows).
     time_sigma : Standard error of the stamps [s].
     zero : First stamp as it stands, where it is a number of seconds; zero for times of day.
+    place : North and east of the stated position at the execute [m]; None where none is stated.
     assumed : What was found or taken for granted.
     findings : What is wrong with it.
     """
@@ -60,6 +61,7 @@ class Recording:
     assumed: tuple[str, ...]
     findings: tuple[Finding, ...] = field(default=())
     zero: float = 0.0
+    place: tuple[float, float] | None = None
 
     def row_at(self, time: float) -> int:
         """File row of the sample nearest a time."""

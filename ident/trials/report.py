@@ -13,6 +13,7 @@ from ident.text import on_screen
 from ident.trials.criteria import criteria
 from ident.trials.measure import Value
 from ident.trials.spec import TrialFile, load_spec
+from ident.trials.stated import quoted
 from ident.trials.trial import Trial, measure_trial, side_of
 from sim.files.errors import InputError
 
@@ -78,7 +79,8 @@ def measure_all(path: Path, spec: TrialFile) -> Trials:
         beside = one.with_suffix(".toml")
         try:
             stated = load_spec(beside).model_dump(exclude_unset=True) if beside.is_file() else {}
-            trials.append(measure_trial(one, TrialFile.model_validate(spec.model_dump(exclude_unset=True) | stated)))
+            both = TrialFile.model_validate(spec.model_dump(exclude_unset=True) | stated)
+            trials.append(measure_trial(one, both, every_key=False))
         except InputError as error:
             refused.append((str(one), f"{error.where}: {error.found}; allowed: {error.allowed}"))
     if not trials:
@@ -165,6 +167,8 @@ def _show_one(one: Trial, console: Console) -> None:
     for c in _criteria(one):
         word = {True: "[green]met[/]", False: "[red]not met[/]", None: "undecided, within two standard errors"}[c.met]
         console.print(f"IMO MSC.137(76) {c.paragraph}: {c.metric} below {c.limit:.4g}: {word}", highlight=False)
+    for key, value in quoted(one.spec).items():
+        console.print(f"{key}: {escape(str(value))}", highlight=False)
     console.print("assumed:", highlight=False)
     for text in one.assumed:
         console.print(f"  {escape(text)}", highlight=False)

@@ -42,10 +42,12 @@ class Start(Data):
     Attributes
     ----------
     heading_deg : Ordered course [deg].
+    pitch_deg : Pitch from which a vertical zigzag counts [deg].
     x_m, y_m : Position, along the record's axes [m].
     """
 
     heading_deg: Annotated[float, Field(ge=-720, le=720)] | None = None
+    pitch_deg: Annotated[float, Field(ge=-90, le=90)] | None = None
     x_m: float | None = None
     y_m: float | None = None
 
@@ -107,6 +109,9 @@ class TrialFile(Data):
     length_m : Reference length of the boat at full scale, for the criteria [m].
     density_kgpm3 : Of the water; stated in the report, and in what is compared with the record.
     step_m : Ordered change of depth, down [m].
+    released_s : Time from which the autopilot steers, after a push by the rudder, on the record's clock [s].
+    surface_point_m : Point of the boat whose arrival at the surface ends a rise, from where the depth is measured:
+        forward, starboard, down, full scale [m].
     loading : Loading condition, stated in the report.
     source : Where the record comes from.
     delimiter : Where it cannot be found out.
@@ -130,7 +135,9 @@ class TrialFile(Data):
     current: Current | None = None
     length_m: Positive | None = None
     density_kgpm3: Positive | None = None
-    step_m: float | None = None
+    step_m: Annotated[float, Field(ge=-1e5, le=1e5)] | None = None
+    released_s: float | None = None
+    surface_point_m: tuple[float, float, float] | None = None
     loading: str = ""
     source: str = ""
     delimiter: Literal["", ",", ";", "\t", " "] = ""

@@ -10,15 +10,23 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ident.timeseries.smoothing import noise_of
 from ident.trials.reading import Recording
 from sim.files.record import Record
 
+Array = NDArray[np.float64]
 # Noise grows by so much in all before a filter is seen; the stride is the first that sees this share of the most.
 _GROWS, _ENDS = 1.3, 0.93
+# Quarter of the distribution that is quiet: its quantile of a normal distribution's size.
+_QUIET, _NORMAL = 25.0, 0.31864
+# Sum of the squares of 1, 3, 3, 1: variance of a third difference of white noise.
+_THIRD = 20.0
 # From one stride to the next filtered noise grows by less than this; a path that is sampled too coarsely by more.
 _COARSE = 2.0
+# From there on samples are independent: it grows by less than this.
+_LEVEL = 1.08
 # Noise of so many last digits is that of rounding.
 _DIGITS = 3.0
 # Samples are left at most this share of the record apart, and no fewer than so many.
@@ -39,6 +47,15 @@ def with_white_noise(one: Recording) -> Recording:
     return one.with_(channels=channels, assumed=tuple(said))
 
 
+def _quiet_noise(x: Array, stride: int) -> float:
+    """Noise of every k-th sample, from third differences where the record is at its quietest.
+
+    A path that bends between its samples shows noise too, where the boat maneuvers; a filter is at work everywhere.
+    """
+    apart = x[3 * stride :] - 3.0 * x[2 * stride : -stride] + 3.0 * x[stride : -2 * stride] - x[: -3 * stride]
+    return float(np.percentile(np.abs(apart), _QUIET)) / (_NORMAL * math.sqrt(_THIRD))
+
+
 def thinned(record: Record, header: str) -> tuple[Record, str]:
     """Every k-th sample of a record, k as large as its noise is filtered; and what was seen, in words.
 
@@ -52,13 +69,16 @@ def thinned(record: Record, header: str) -> tuple[Record, str]:
     The record as it is, and no words, where its noise is white.
     """
     t, x = record.abscissa, record.value
-    strides, sizes = [1], [noise_of(t, x)] if len(record) >= 2 * _FEWEST else [0.0]
+    strides, sizes = [1], [max(noise_of(t, x), _quiet_noise(x, 1))] if len(record) >= 2 * _FEWEST else [0.0]
+    ended = False
     while sizes[0] > 0.0:
         k = 2 * strides[-1]
         if len(record) < k * _FEWEST or float(np.median(np.diff(t))) * k > _APART * float(t[-1] - t[0]):
             break
-        size = noise_of(t[::k], x[::k])
-        if size > _COARSE * sizes[-1]:
+        size = min(noise_of(t[::k], x[::k]), _quiet_noise(x, k))
+        # Independent samples stay as they are; what grows after that is the path between them.
+        if size > _COARSE * sizes[-1] or size < _LEVEL * sizes[-1]:
+            ended = size < _LEVEL * sizes[-1]
             break
         strides.append(k)
         sizes.append(size)
@@ -71,6 +91,6 @@ def thinned(record: Record, header: str) -> tuple[Record, str]:
     at = next(i for i, size in enumerate(sizes) if size >= _ENDS * max(sizes))
     step = float(np.median(np.diff(t)))
     words = f"{header}: its noise is filtered, one sample in {strides[at]} ({strides[at] * step:.2g} s) is used"
-    if at == len(strides) - 1:
+    if not ended:
         words += "; it may be filtered over longer, which no record of this length shows: errors may be too small"
     return record.kept(slice(0, len(record), strides[at])), words

@@ -15,11 +15,13 @@ from ident.trials.alignment import Start, paths, start_of
 from ident.trials.consistency import check_recording, refused
 from ident.trials.earth import in_program_axes
 from ident.trials.exchanged import exchanged
+from ident.trials.keeping import steering_of
 from ident.trials.maneuvers import Maneuver, control_of, maneuver_of
 from ident.trials.measure import DRAWS, Value, measured
 from ident.trials.reading import Recording, read_recording
 from ident.trials.spec import TrialFile
 from ident.trials.spikes import without_spikes
+from ident.trials.stated import quoted, refuse_unused, unused
 from ident.trials.thinning import with_white_noise
 from sim.files.errors import InputError
 
@@ -59,6 +61,7 @@ class Trial:
             "assumed": list(self.assumed),
             "metrics": {name: value.to_dict() for name, value in self.metrics.items()},
             "findings": [f.as_json() for f in self.findings],
+            "stated": quoted(self.spec),
         }
 
 
@@ -104,7 +107,27 @@ def _swings(trial: Trial) -> None:
         raise InputError(place, f"{size:.3g} deg at most, which never comes to {check}", remedy)
 
 
-def measure_trial(path: Path, spec: TrialFile | None = None, count: int = DRAWS) -> Trial:
+def _taken_for_granted(
+    one: Recording, maneuver: Maneuver, start: Start, found: dict[str, SmoothPath], spec: TrialFile
+) -> list[str]:
+    """What the estimator of a maneuver takes for granted."""
+    if maneuver.kind == "course_keeping":
+        steering = steering_of(one, start, spec)
+        return [steering.said if steering else "no push by the rudder at the execute: deviations only"]
+    if maneuver.kind == "depth_change" and "z" in found:
+        stated = spec.step_m is not None
+        order = (
+            f"{spec.step_m:g} m: stated" if stated else "what the last tenth of the record comes to; step_m states it"
+        )
+        return [f"ordered change of depth: {order}"]
+    if maneuver.kind == "rise" and spec.surface_point_m is None:
+        return [
+            "rise: measured to the end of the record; surface_point_m ends it where that point comes to the surface"
+        ]
+    return []
+
+
+def measure_trial(path: Path, spec: TrialFile | None = None, count: int = DRAWS, every_key: bool = True) -> Trial:
     """Read, check, align and measure one recorded maneuver.
 
     Parameters
@@ -112,6 +135,7 @@ def measure_trial(path: Path, spec: TrialFile | None = None, count: int = DRAWS)
     path : The record.
     spec : What it does not say of itself.
     count : Draws from the posterior of the paths, for the standard errors.
+    every_key : Refuse a key that changes nothing on this record; of several records it is only said.
 
     Raises
     ------
@@ -126,7 +150,8 @@ def measure_trial(path: Path, spec: TrialFile | None = None, count: int = DRAWS)
     Value(value=11.42, sigma=0.03, unit='deg')
     """
     spec = spec or TrialFile()
-    one = in_program_axes(without_spikes(read_recording(path, spec)), spec)
+    as_read = read_recording(path, spec)
+    one = in_program_axes(without_spikes(as_read), spec)
     findings = [*one.findings, *exchanged(one), *check_recording(one)]
     # Exchanged channels would be taken for a maneuver that was not made.
     refused(one, [f for f in findings if f.check == "exchanged_channels"], True, True)
@@ -136,6 +161,9 @@ def measure_trial(path: Path, spec: TrialFile | None = None, count: int = DRAWS)
         # A unit slip hides the maneuver: it is said first.
         refused(one, findings, True, False)
         raise
+    idle = unused(as_read, one, maneuver, spec)
+    if every_key:
+        refuse_unused(str(path), idle)
     track = maneuver.kind in ("turning_circle", "stopping")
     sure = _borne_out(one, maneuver, findings)
     refused(one, findings, track, sure)
@@ -148,7 +176,8 @@ def measure_trial(path: Path, spec: TrialFile | None = None, count: int = DRAWS)
         named = f"no smooth path through {', '.join(one.headers.values())[:160]}: {error}"
         remedy = "a record whose samples are even in time and of a size: look at the clock and the units"
         raise InputError(str(path), named, remedy) from error
-    said = (*one.assumed, by, *start.said, *taken)
+    by_key = [f"key {key}: changes nothing here, {why}" for key, why, _ in idle]
+    said = (*one.assumed, *by_key, by, *start.said, *taken, *_taken_for_granted(one, maneuver, start, found, spec))
     done = Trial(one, spec, maneuver, start, found, metrics, said, tuple(findings))
     _swings(done)
     return done
