@@ -23,7 +23,8 @@ from ident.metrics.measure import channels_of, measured
 from ident.trials.spec import TrialFile
 from ident.trials.trial import measure_trial
 from sim.boat.coefficients import Coefficients
-from sim.flight.case import load_case, load_reference
+from sim.flight.case import load_case
+from sim.flight.series import load_reference
 from sim.flight.simulate import Simulation, simulate
 
 # Standard errors of a sample: a good gyro, log, depth gauge, satellite position and transducers.
