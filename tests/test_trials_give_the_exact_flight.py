@@ -13,6 +13,7 @@ from trial_records import SCALE, approach, truth, turn, turned, write, zigzag
 from ident.cli import main
 from ident.trials.spec import TrialFile
 from ident.trials.trial import measure_trial
+from sim.files.errors import InputError
 
 COUNT = 60
 
@@ -129,6 +130,14 @@ def test_stamps_of_three_digits_repeat(tmp_path):
     (tmp_path / "zz.csv").write_text("\n".join(lines), encoding="utf-8")
     done = held(tmp_path / "zz.csv", truth()["zigzag"])
     assert any("even clock of 0.5 s" in text for text in done.assumed)
+
+
+def test_stamps_that_are_all_alike_are_no_clock(tmp_path):
+    """Found by mutations: an even clock of no step."""
+    lines = ["time [s],psi [deg]", *["3.0,1.0"] * 40]
+    (tmp_path / "zz.csv").write_text("\n".join(lines), encoding="utf-8")
+    with pytest.raises(InputError, match="39 stamps repeat"):
+        measure_trial(tmp_path / "zz.csv", None, COUNT)
 
 
 def test_long_table_gives_what_the_wide_one_gives(tmp_path):

@@ -30,6 +30,8 @@ _ROUGHER = 10.0
 _MOST_KNOTS = 1600
 # Decades of the smoothing parameter that are searched, about the one of a unit response.
 _DECADES = (-9.0, 13.0)
+# Loss where a system cannot be solved: infinity would leave the minimiser without a number.
+_HOPELESS = 1e30
 
 
 @dataclass(frozen=True)
@@ -239,7 +241,7 @@ def _likely(time: Array, value: Array) -> tuple[float, float]:
         try:
             factor, left = rest(weight)
         except np.linalg.LinAlgError:
-            return math.inf
+            return _HOPELESS
         return free * math.log(left / free) + _log_det(factor) - rank * math.log(weight)
 
     grid = np.arange(*_DECADES)
@@ -289,7 +291,7 @@ def _density(knots: Array, told: list[Samples], bands: Array, right: Array, near
         try:
             factor, solved = _solve(bands + weight * penalty, right)
         except np.linalg.LinAlgError:
-            return math.inf
+            return _HOPELESS
         left = sum(float(np.sum((s.value - _fitted(knots, solved, s)) ** 2)) / s.sigma**2 for s in told)
         return left + weight * _roughness(knots, solved) + _log_det(factor) - rank * math.log(weight)
 

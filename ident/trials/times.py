@@ -76,6 +76,9 @@ def _even(raw: Array, half: Array) -> tuple[float, float] | None:
     weight = 1.0 / half
     fit = np.linalg.lstsq(np.column_stack([np.ones(raw.size), row]) * weight[:, None], raw * weight, rcond=None)[0]
     start, step = float(fit[0]), float(fit[1])
+    if not step > 1e-9 * float(np.max(half)):
+        # Stamps that are all alike.
+        return None
     for simple in (
         *(float(f"{step:.{k}g}") for k in (1, 2, 3)),
         *(1.0 / round(1.0 / step, k) for k in (0, 1) if round(1.0 / step, k)),
