@@ -46,6 +46,8 @@ def weights(a: Matrix, sigma: Array) -> Array:
     1/sigma; an equation without any error outweighs the best of the others.
     """
     scale = abs(a).max(axis=1) if isinstance(a, np.ndarray) else abs(csr_array(a)).max(axis=1).toarray()
+    # An equation of nothing says nothing, whatever its weight.
+    scale = np.where(scale > 0.0, scale, np.inf)
     relative = sigma / scale
     positive = relative[relative > 0.0]
     least = 1e-3 * positive.min() if positive.size else 1.0

@@ -20,6 +20,10 @@ _MOST_ADDED = (1.0, 5.0, 5.0, 5.0, 5.0, 5.0)
 _LEAST_ADDED = -0.05
 # Faster than any rudder servo [deg/s].
 _FASTEST_PLANE = 1000.0
+# Less is no plane [deg]: a limit in radians.
+_LEAST_LIMIT = 1.0
+# What may stand above the sail top, over the length: planes of a boat whose sail top is stated on the axis.
+_ABOVE = 0.05
 _MOTIONS = ("surge", "sway", "heave", "roll", "pitch", "yaw")
 # Floating boats displace what they weigh; a submerged one differs by what its planes can carry.
 _OUT_OF_TRIM = 0.5
@@ -127,6 +131,19 @@ def _places(vehicle: Any) -> Iterator[tuple[str, str, str]]:
         away = float(np.linalg.norm(np.array(place) - middle))
         if away > length:
             yield key, f"{away:.4g} m from the centre of buoyancy", f"a place on the boat, which is {length:g} m long"
+    if given.sail_top:
+        yield from _below_the_sail(places, np.array(given.sail_top.value), length, vehicle.frame.frame.sign("z"))
+
+
+def _below_the_sail(places: Any, top: Any, length: float, down: float) -> Iterator[tuple[str, str, str]]:
+    """The sail top is the highest point of a boat, or the axis of one that has no other."""
+    for key, place in places.items():
+        if key.startswith("tanks"):
+            continue
+        above = down * (float(top[2]) - place[2])
+        if above > _ABOVE * length:
+            text = "a place below the sail top, particulars.sail_top"
+            yield key, f"{above:.4g} m above the sail top", text
 
 
 def _plane(plane: Any, vehicle: Any) -> Iterator[tuple[str, str, str]]:
@@ -142,8 +159,8 @@ def _plane(plane: Any, vehicle: Any) -> Iterator[tuple[str, str, str]]:
             f"{plane.span_axis} along the leading edge's {plane.leading_edge}",
             "a span across it",
         )
-    if plane.limit_deg > 90.0:
-        yield f"{key}, limit_deg", f"{plane.limit_deg:g}", "90 at most"
+    if not _LEAST_LIMIT <= plane.limit_deg <= 90.0:
+        yield f"{key}, limit_deg", f"{plane.limit_deg:g}", f"{_LEAST_LIMIT:g} to 90, in degrees"
     if plane.rate_degps > _FASTEST_PLANE:
         yield f"{key}, rate_degps", f"{plane.rate_degps:g}", f"{_FASTEST_PLANE:g} at most"
     partner = next(p for p in vehicle.planes if p.name == plane.mirror)

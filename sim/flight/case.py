@@ -52,8 +52,8 @@ class Initial(Data):
     state: Literal["self_propulsion", "as_given"]
     speed_mps: Annotated[float, Field(ge=0)]
     depth_m: float
-    heel_deg: float = 0.0
-    pitch_deg: float = 0.0
+    heel_deg: Annotated[float, Field(ge=-180, le=180)] = 0.0
+    pitch_deg: Annotated[float, Field(ge=-90, le=90)] = 0.0
     revolutions_rps: float | None = None
     trim: Literal["planes", "ballast", "tanks"] = "planes"
     upright: bool = False

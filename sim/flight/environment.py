@@ -7,7 +7,11 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
+from sim.files.constants import constant
 from sim.files.schema import Data, Positive
+
+# Of water, fresh and hot to brine.
+Water = Annotated[float, Field(ge=constant("least_water_density"), le=constant("most_water_density"))]
 
 
 class CurrentData(Data):
@@ -33,7 +37,7 @@ class LayerData(Data):
     """
 
     depth_m: Annotated[float, Field(ge=0)]
-    density_kgpm3: Positive
+    density_kgpm3: Water
 
 
 class EnvironmentData(Data):
@@ -51,8 +55,8 @@ class EnvironmentData(Data):
         waves, which need the vehicle's geometry alike.
     """
 
-    density_kgpm3: Positive
-    gravity_mps2: Positive
+    density_kgpm3: Water
+    gravity_mps2: Annotated[float, Field(ge=constant("least_gravity"), le=constant("most_gravity"))]
     free_surface: bool = False
     current: CurrentData | None = None
     layer: Annotated[list[LayerData], Field(max_length=8)] = Field(default_factory=list)
