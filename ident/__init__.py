@@ -9,9 +9,10 @@ Examples
 Frozen({})
 """
 
-import sys
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
+
+from ident.arrival import register_with_gymnasium
 
 if TYPE_CHECKING:
     from ident.analysis.result import Linear, Stability, StabilityMap
@@ -33,7 +34,9 @@ if TYPE_CHECKING:
     from ident.validation.result import ChannelError, Validation
     from ident.validation.validate import validate
     from sim.files.errors import InputError
+    from sim.flight.guidance import LineOfSight
     from sim.flight.plant import Plant
+    from sim.flight.sensors import Sensors
     from sim.flight.simulate import Simulation
     from sim.flight.trim import NoEquilibrium
 
@@ -52,6 +55,8 @@ _PLACES = {
     "write_starter": "ident.starter.write",
     "schema": "ident.schemas.describe",
     "Plant": "sim.flight.plant",
+    "Sensors": "sim.flight.sensors",
+    "LineOfSight": "sim.flight.guidance",
     "Database": "ident.database.versions",
     "DatabaseVersion": "ident.database.versions",
     "Difference": "ident.database.compare",
@@ -87,6 +92,8 @@ __all__ = [  # noqa: RUF022  (in the order of the work)
     "write_starter",
     "schema",
     "Plant",
+    "Sensors",
+    "LineOfSight",
     "Database",
     "DatabaseVersion",
     "Difference",
@@ -111,9 +118,7 @@ __all__ = [  # noqa: RUF022  (in the order of the work)
 ]
 
 
-# Known to Gymnasium where that is in use already; else ``import ident.environments``.
-if "gymnasium" in sys.modules:
-    import_module("ident.environments")
+register_with_gymnasium()
 
 
 def __getattr__(name: str) -> Any:

@@ -11,6 +11,7 @@ import click
 
 from ident import __version__
 from ident.commands import animate, campaigns, doctor, exports, flights, maneuvers, start, trials, versions
+from ident.commands.log import LEVELS, log_level
 from ident.commands.process import Terminated, ends_when_asked, ready_streams, silence
 from ident.commands.shared import inputs_kept
 from ident.text import visible
@@ -75,6 +76,15 @@ def _refuse(ctx: click.Context, where: str, found: str, allowed: str) -> NoRetur
 
 @click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(__version__, prog_name="ident")
+@click.option(
+    "--log-level",
+    type=click.Choice(LEVELS),
+    envvar="IDENT_LOG_LEVEL",
+    show_envvar=True,
+    callback=log_level,
+    expose_value=False,
+    help="Log on standard error what a command does, before its name: ident --log-level info fit ...",
+)
 def main() -> None:
     """Captive submarine tests to a maneuvering model people trust.
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import errno
 import glob
+import logging
 import os
 import platform
 import shutil
@@ -19,6 +20,8 @@ from typing import Any, TypeVar
 from sim.files.mirror import is_alive
 
 T = TypeVar("T")
+
+_log = logging.getLogger(__name__)
 
 # Told of long work as it goes on: what is being done, how much of it is done, and of how much.
 Tell = Callable[[str, int, int], None]
@@ -181,7 +184,9 @@ def whole(path: Path) -> Iterator[Path]:
             _remove_left(target)
             _begin(part, target)
             yield part
+            size = part.stat().st_size
             part.replace(target)
+            _log.info("file written", extra={"file": str(path), "bytes": size})
         finally:
             with contextlib.suppress(OSError):
                 part.unlink()

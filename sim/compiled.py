@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
-import sys
+import logging
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar, cast
@@ -156,16 +156,17 @@ class _LazyCache:
 
 _LOOPS = {"run": "a flight", "hold": "a flight", "fill_rate": "the right-hand side", "step": "the right-hand side"}
 _said: set[str] = set()
+_log = logging.getLogger(__name__)
 
 
 def _announce(function: Callable[..., Any], sig: Any, how_often: str) -> None:
-    """Say on stderr what takes so long, once a process for each of calm water and waves."""
+    """Say what takes so long, once a process for each of calm water and waves."""
     waves = "Surroundings" in str(sig)
     where = "in waves" if waves else "in calm water"
     if function.__name__ in _LOOPS and where not in _said:
         _said.add(where)
         seconds = _WAVES if waves else _CALM
-        print(f"compiling the right-hand side {where}, {how_often}, about {seconds} s", file=sys.stderr, flush=True)
+        _log.warning("compiling the right-hand side %s, %s, about %s s", where, how_often, seconds)
 
 
 def outer(function: F) -> F:

@@ -12,6 +12,7 @@ written it. Nothing heavy is imported here.
 from __future__ import annotations
 
 import hashlib
+import logging
 import os
 import re
 import stat
@@ -22,6 +23,7 @@ from pathlib import Path
 
 VARIABLE = "NUMBA_CACHE_DIR"
 PREFIX = "ident-compiled-"
+_log = logging.getLogger(__name__)
 
 # Folders that stay whatever their age, and the age [s] below which any stays.
 _KEPT = 5
@@ -139,6 +141,7 @@ def cache_place(folder: Path) -> Path | None:
     """
     name = PREFIX + sources_key(folder)
     parent = next((parent for parent in _candidates(folder) if _opened(parent / name)), None)
+    _log.debug("compiled functions", extra={"folder": str(parent / name) if parent else "none: compiled each time"})
     if parent is None:
         return None
     remove_stale(parent)

@@ -108,6 +108,16 @@ def test_generated_c_has_the_current_and_the_layers(boat, compiler, tmp_path):
     _flies_by_c_as_the_simulator(case, simulation, boat, compiler, tmp_path)
 
 
+def test_generated_c_has_the_current_that_carries_the_waves(boat, compiler, tmp_path):
+    data = _case("ss5-4m").model_dump(exclude_none=True)
+    data["environment"]["current"] = CURRENT["current"]
+    data["run"]["duration_s"] = 5.0
+    case = Case.model_validate(data)
+    simulation = fly(case, boat.vehicle, boat.model(case), boat.water(case))
+    assert simulation["y"][-1] > 5.0
+    _flies_by_c_as_the_simulator(case, simulation, boat, compiler, tmp_path)
+
+
 def _flies_by_c_as_the_simulator(case, simulation, boat, compiler, tmp_path):
     done = export_c(boat, case, "coeff_db", tmp_path)
     assert [p.rsplit("/", 1)[1] for p in done["files"]] == ["bb2.h", "bb2.c"]

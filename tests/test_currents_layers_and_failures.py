@@ -11,12 +11,14 @@ import pytest
 from pydantic import ValidationError
 
 from ident.analysis.stability import stability
+from ident.metrics.seakeeping import encounter_of
 from sim.boat.catalogue import STATES
 from sim.files.errors import InputError
 from sim.flight.case import Case, load_case
 from sim.flight.plant import Plant
 from sim.flight.sensors import Sensors
-from sim.flight.simulate import simulate
+from sim.flight.simulate import flow_of, simulate, waves_of
+from sim.waves.linear import kinematics
 
 
 def _text_of(name):
@@ -52,6 +54,52 @@ def test_a_boat_in_a_current_moves_as_in_still_water_and_is_carried(coefficients
     assert np.ptp(still["psi"]) > 0.3
 
 
+@pytest.mark.parametrize(("name", "direction"), [("ss5-4m", 0.0), ("turn20-ss5-4m", 60.0)])
+def test_waves_and_boat_are_carried_by_a_current_together(coefficients, name, direction):
+    """Galilei again: waves in the water that flows meet the boat as those of still water do.
+
+    The first boat's autopilot keeps its track over ground, which a current ahead does not turn it from.
+    """
+    case = load_case(name)[0]
+    case = case.model_copy(update={"run": case.run.model_copy(update={"duration_s": 40.0})})
+    still = simulate(case, coefficients)
+    flowing = simulate(_in(case, current={"speed_mps": 1.5, "direction_deg": direction}), coefficients)
+    carried = 1.5 * np.array([math.cos(math.radians(direction)), math.sin(math.radians(direction))])
+    # Sums of many waves are in single precision.
+    close = 1e-9 if still.waves.amplitude.size == 1 else 2e-4
+    assert flowing["x"] - still["x"] == pytest.approx(carried[0] * still["t"], abs=close)
+    assert flowing["y"] - still["y"] == pytest.approx(carried[1] * still["t"], abs=close)
+    for channel in ("u", "w", "z", "theta", "q", "psi"):
+        assert flowing[channel] == pytest.approx(still[channel], abs=close)
+    assert np.ptp(still["theta"]) > 0.01
+
+
+def test_a_wave_on_a_current_passes_a_fixed_place_with_the_doppler_frequency():
+    """omega + k U cos(mu) at a place over ground (Peregrine 1976, Eq. 2.6); what the water does in it is the same."""
+    case = _in(load_case("ss5-4m")[0], current={"speed_mps": 1.2, "direction_deg": 210.0})
+    waves = waves_of(case)
+    k, omega = waves.number[0], waves.frequency[0]
+    passing = omega + k * 1.2 * math.cos(math.radians(210.0 - 180.0))
+    time = np.linspace(0.0, 30.0, 301)
+    found = kinematics(waves, np.zeros((301, 3)), time)
+    assert found.elevation == pytest.approx(waves.amplitude[0] * np.cos(passing * time), abs=1e-9)
+    assert np.abs(found.velocity).max() == pytest.approx(omega * waves.amplitude[0], rel=1e-3)
+    carried = np.array(flow_of(case)) * 20.0
+    beside = kinematics(waves, np.array([*carried, 0.0]), 20.0).elevation
+    assert beside == pytest.approx(kinematics(waves_of(load_case("ss5-4m")[0]), np.zeros(3), 20.0).elevation, abs=1e-9)
+
+
+def test_encounters_are_counted_in_the_water(coefficients):
+    """Frequency of encounter of a boat in head seas is that of still water, whatever carries both."""
+    case = load_case("ss5-4m")[0]
+    waves = waves_of(_in(case, current={"speed_mps": 1.2, "direction_deg": 30.0}))
+    time = np.linspace(0.0, 100.0, 501)
+    north, east = flow_of(_in(case, current={"speed_mps": 1.2, "direction_deg": 30.0}))
+    found = encounter_of(waves, time, (5.0 + north) * time, east * time)
+    still = encounter_of(waves_of(case), time, 5.0 * time, 0.0 * time)
+    assert (found.speed, found.frequency, found.angle) == pytest.approx((still.speed, still.frequency, still.angle))
+
+
 def test_what_is_off_or_changes_nothing_is_the_same_to_the_last_digit(coefficients):
     case = load_case("hzz20")[0]
     case = case.model_copy(update={"run": case.run.model_copy(update={"duration_s": 20.0})})
@@ -83,9 +131,11 @@ def test_buoyancy_over_layers_and_of_a_hull_pressed_together(coefficients):
     assert share < 1.0
 
 
-def test_waves_on_a_current_and_layers_out_of_order_are_refused():
-    with pytest.raises(ValidationError, match="waves on a current"):
-        _in(load_case("ss5-4m")[0], current={"speed_mps": 1.0, "direction_deg": 0.0})
+def test_waves_over_layers_and_layers_out_of_order_are_refused():
+    with pytest.raises(ValidationError, match="waves over layers"):
+        _in(load_case("ss5-4m")[0], layer=[{"depth_m": 3.0, "density_kgpm3": 1020.0}])
+    with pytest.raises(ValidationError, match="without free_surface"):
+        _in(load_case("hzz20")[0], free_surface=True, hull_compressibility_perm=1e-5)
     upside = [{"depth_m": 60.0, "density_kgpm3": 1030.0}, {"depth_m": 20.0, "density_kgpm3": 1020.0}]
     with pytest.raises(ValidationError, match="shallow to deep"):
         _in(load_case("hzz20")[0], layer=upside)

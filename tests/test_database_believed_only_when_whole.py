@@ -378,7 +378,7 @@ with held(Path(sys.argv[1])):
 """
 
 
-def test_who_waits_for_a_lock_says_whose_it_is_and_ends(db, few, capsys):
+def test_who_waits_for_a_lock_says_whose_it_is_and_ends(db, few, caplog):
     program = [sys.executable, "-c", HOLDER, str(db)]
     with subprocess.Popen(program, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as holder:
         assert holder.stdout.readline() == "ready\n"
@@ -387,7 +387,7 @@ def test_who_waits_for_a_lock_says_whose_it_is_and_ends(db, few, capsys):
         with pytest.raises(InputError, match=message):
             commit(str(db), times(few, 9), {}, wait=0.3)
         assert time.monotonic() - started < 10.0
-        assert f"waiting up to 0.3 s for process {holder.pid} on " in capsys.readouterr().err
+        assert f"waiting up to 0.3 s for process {holder.pid} on " in caplog.text
         assert len(versions(str(db))) == 3
         holder.communicate("done\n")
     assert commit(str(db), times(few, 9), {}, wait=0.3) == (3, True)

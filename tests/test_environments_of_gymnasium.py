@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import subprocess
+import sys
 import time
 import warnings
 
@@ -48,6 +50,23 @@ def test_an_environment_moves_its_boat_as_the_plant_does(case, fitted_db):
         said = env.step(action)[4]
         assert np.array_equal(said["state"], plant.step(dV=action[0], dH=action[1]))
     assert abs(said["state"][11]) > 1e-4
+
+
+@pytest.mark.parametrize(
+    "code",
+    [
+        "import ident, gymnasium; print(gymnasium.spec('ident/Zigzag-v0').id)",
+        "import gymnasium, ident; print(gymnasium.spec('ident/Zigzag-v0').id)",
+        "import gymnasium; print(gymnasium.make('ident:ident/Zigzag-v0', case='nowhere'))",
+    ],
+)
+def test_one_import_or_the_name_itself_registers_the_environments(code):
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    if "nowhere" in code:
+        # Known to Gymnasium, and asked for a case that there is not.
+        assert "InputError" in done.stderr
+    else:
+        assert done.stdout == "ident/Zigzag-v0\n", done.stderr
 
 
 def test_many_boats_at_once_are_as_many_plants(coefficients, fitted_db):

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import glob
 import hashlib
+import logging
 import os
 from dataclasses import dataclass, field
 from functools import cache
@@ -48,6 +49,7 @@ from sim.files.inputs import note
 
 # Further files that one message names.
 _SHOWN = 20
+_log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
@@ -300,6 +302,8 @@ def read_campaign(
         run = runs[bad.any(axis=1)].iloc[0]
         place = f"{folder / run['file']}, row {run['row']}"
         raise InputError(place, "a load that is not finite at full scale", "smaller numbers")
+    said = {"campaign": header.name, "vehicle": vehicle.name, "runs": len(runs), "files": len(digests)}
+    _log.info("campaign read", extra=said)
     return Campaign(header, vehicle, runs, digests, *histories)
 
 

@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import functools
 import json
+import logging
 import os
 import sys
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import click
+
+_log = logging.getLogger(__name__)
 
 DB = click.option("--db", default="coeff_db", show_default=True, help="Database folder or object-store URL.")
 WAIT = click.option(
@@ -98,6 +102,10 @@ def _refuse_inputs(command: click.Command, values: dict[str, Any]) -> None:
 _RESULTS = (".json", ".png", ".svg", ".pdf", ".html", ".gif", ".mp4")
 
 
+def _after(command: click.Command, began: float) -> dict[str, object]:
+    return {"command": command.name, "seconds": round(time.monotonic() - began, 3)}
+
+
 def inputs_kept(command: click.Command) -> click.Command:
     """The command, which refuses to write over what it reads before it begins."""
     command_itself = command.callback
@@ -109,7 +117,16 @@ def inputs_kept(command: click.Command) -> click.Command:
 
         _refuse_inputs(command, values)
         inputs.begin()
-        return command_itself(**values)
+        given = {f"option_{k}": v for k, v in values.items() if v not in (None, "", (), False)}
+        _log.debug("command begins", extra={"command": command.name, **given})
+        began = time.monotonic()
+        try:
+            found = command_itself(**values)
+        except BaseException as error:
+            _log.info("command ends early", extra=_after(command, began) | {"by": type(error).__name__})
+            raise
+        _log.info("command ends", extra=_after(command, began))
+        return found
 
     command.callback = kept
     return command

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import contextlib
 import json
+import logging
 import os
 import socket
-import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -20,19 +20,17 @@ OWNER = ".lock.owner"
 WAIT = 60.0
 
 
-def _say(text: str) -> None:
-    print(text, file=sys.stderr, flush=True)
+_log = logging.getLogger(__name__)
 
 
 @contextlib.contextmanager
-def held(folder: Path, wait: float = WAIT, say: Callable[[str], None] = _say) -> Iterator[None]:
+def held(folder: Path, wait: float = WAIT) -> Iterator[None]:
     """The lock of a database folder; it falls with its process.
 
     Parameters
     ----------
     folder : Of the database.
     wait : How long to wait for another writer [s].
-    say : Called with one line when there is one.
 
     Raises
     ------
@@ -45,7 +43,7 @@ def held(folder: Path, wait: float = WAIT, say: Callable[[str], None] = _say) ->
     try:
         lock.acquire(timeout=0)
     except Timeout:
-        say(f"{folder}: waiting up to {wait:g} s for {owner(folder)}")
+        _log.warning("%s: waiting up to %g s for %s", folder, wait, owner(folder))
         try:
             lock.acquire(timeout=wait)
         except Timeout as error:

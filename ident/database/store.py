@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import logging
 import random
 import time
 from pathlib import Path
@@ -45,6 +46,7 @@ FOR_EVER = {
 }
 
 Array = NDArray[np.float64]
+_log = logging.getLogger(__name__)
 
 # Disagreements are kept to a billionth of a standard error.
 _RESIDUAL_DIGITS = 9
@@ -197,6 +199,7 @@ def _commit(path: str, rows: pd.DataFrame, metadata: dict[str, str], wait: float
             # Nothing is put on top of what is damaged.
             beside = whole_version(log, log.last)
             if beside.pop(vehicle, "") == content:
+                _log.info("version unchanged", extra={"database": path, "version": log.last, "digest": content[:16]})
                 return log.last, False
             log = _kept_for_ever(log)
         before = last_own(log.versions, vehicle, log.last) if log else None
@@ -207,7 +210,10 @@ def _commit(path: str, rows: pd.DataFrame, metadata: dict[str, str], wait: float
             predicate = "vehicle = '" + vehicle.replace("'", "''") + "'"
             how = {"mode": "overwrite", "schema_mode": "merge", "predicate": predicate}
         if _written(path, rows, said, how, last_try=time.monotonic() > until):
-            return _finished(path, said["seal"]), True
+            number = _finished(path, said["seal"])
+            what = {"database": path, "version": number, "vehicle": vehicle, "rows": len(rows)}
+            _log.info("version committed", extra=what | {"digest": content[:16]})
+            return number, True
         # Another fit committed in between, as it can on an object store: look again, not all at once.
         time.sleep(random.uniform(0.05, 0.5))
 

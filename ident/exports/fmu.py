@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import logging
 import os
 import shutil
 import subprocess
@@ -21,6 +22,7 @@ from sim.files.errors import InputError
 from sim.flight.case import Case
 
 # First value references.
+_log = logging.getLogger(__name__)
 _REFS = {"time": 0, "state": 1, "command": 20, "control": 30, "waves": 70, "speed": 71, "depth": 72}
 _STATE_UNITS = ("m/s",) * 3 + ("rad/s",) * 3 + ("m",) * 3 + ("rad",) * 3
 _COMMAND_UNITS = ("rad", "rad", "1/s", "kg", "m")
@@ -133,6 +135,7 @@ def compiled(texts: dict[str, str]) -> bytes:
         )
         if done.returncode:
             raise InputError(f"the C compiler {found}", done.stderr.strip()[-500:], "a compiler of C99")
+        _log.info("compiled", extra={"compiler": found, "files": " ".join(names)})
         return (Path(folder) / "boat.so").read_bytes()
 
 

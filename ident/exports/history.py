@@ -35,9 +35,9 @@ _ENDINGS = {"s": "s", "m": "m", "m/s": "mps", "rad": "rad", "rad/s": "radps", "1
 _STANDARD = {"phi": "platform_roll", "theta": "platform_pitch", "psi": "platform_yaw"}
 _MEANING = {
     "t": "time from the start of the run",
-    "u": "velocity forward, relative to earth",
-    "v": "velocity to starboard, relative to earth",
-    "w": "velocity downwards in body axes, relative to earth",
+    "u": "velocity forward, relative to earth, in a current to the water it carries",
+    "v": "velocity to starboard, likewise",
+    "w": "velocity downwards in body axes, likewise",
     "p": "roll rate",
     "q": "pitch rate",
     "r": "yaw rate",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import logging
 import math
 import os
 from collections import Counter
@@ -14,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 from ident.captive.campaign import Campaign, find_campaigns, read_campaign
 from ident.captive.combine import by_vehicle
 from ident.checks.check import check_campaign, refuse_errors
-from ident.checks.findings import Finding
+from ident.checks.findings import SEVERITIES, Finding
 from ident.cluster import cluster
 from ident.database.lock import WAIT
 from ident.database.provenance import conversions, run_sources
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
     import pandas as pd
     from rich.console import Console
 
+_log = logging.getLogger(__name__)
 _UNUSED = ("run_id", "file", "row", "output", "reason")
 
 
@@ -233,6 +235,8 @@ def fit(
         read, paths = by_vehicle([read_campaign(path, tell=tell, spread=spread) for path in paths], paths)
         identified = [identify(campaign, tell, spread) for campaign in read]
     checked = [check_campaign(*one, tell) for one in zip(read, paths, identified, strict=True)]
+    for one, findings in zip(identified, checked, strict=True):
+        _log_checks(one.campaign, findings)
     if not force.strip():
         for path, findings in zip(paths, checked, strict=True):
             refuse_errors(path, findings)
@@ -250,8 +254,15 @@ def fit(
     done: list[Fit] = []
     for (campaign, one, _), (rows, estimates), findings in zip(ready, whole, checked, strict=True):
         version, new = commit(path_of_db, rows, metadata(campaign, one, message, findings, estimates, force), wait)
+        applied = " ".join(e.name for e in estimates if e.applied)
+        _log.info("campaign fitted", extra={"campaign": campaign.header.name, "version": version, "estimates": applied})
         done.append(Fit(campaign, one, rows, version, new, digest(rows), findings, estimates))
     return Results(done)
+
+
+def _log_checks(campaign: Campaign, findings: list[Finding]) -> None:
+    counts = {severity: sum(f.severity == severity for f in findings) for severity in SEVERITIES}
+    _log.info("campaign checked", extra={"campaign": campaign.header.name, **counts})
 
 
 def _measured(campaign: Campaign, identified: Identification, measured_only: bool) -> pd.DataFrame:

@@ -13,6 +13,7 @@ everything found so far is carried through each subtraction.
 
 from __future__ import annotations
 
+import logging
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -33,6 +34,7 @@ from sim.boat.catalogue import Term
 from sim.boat.parts import Point
 
 Array = NDArray[np.float64]
+_log = logging.getLogger(__name__)
 
 
 @dataclass
@@ -126,6 +128,8 @@ def _identify(campaign: Campaign, tell: Tell, spread: Spread) -> tuple[Identific
         tell("identifying", done, len(at))
         done += len(rows)
         solver.solve(runs, solver.equations(runs, rows), first, spread)
+        values = len(solver.nodes) - first
+        _log.debug("stage solved", extra={"stage": int(stage), "runs": len(rows), "values": values})
         solver.tables.clear()
         _propulsion_point(solver, campaign.runs.iloc[rows])
     tell("identifying", len(at), len(at))

@@ -97,7 +97,7 @@ def turn_drift(simulation: Simulation) -> Metrics:
     """How a turning circle drifts with the waves: velocity of its centre and its diameter.
 
     Each whole turn of the heading after the first has a mean position and an extent; the drift
-    is the slope of the mean positions over time, errors are those of the scatter among turns.
+    is the slope of the mean positions in the water over time, errors are those of the scatter among turns.
     """
     heading = np.unwrap(simulation["psi"]) - simulation["psi"][0]
     turns = np.floor(np.abs(heading) / (2.0 * math.pi)).astype(int)
@@ -111,9 +111,10 @@ def turn_drift(simulation: Simulation) -> Metrics:
     ahead /= max(float(np.hypot(*ahead)), 1e-12)
     for k in whole:
         use = turns == k
-        x, y = simulation["x"][use], simulation["y"][use]
+        t = simulation["t"][use]
+        x, y = simulation["x"][use] - waves.flow_north * t, simulation["y"][use] - waves.flow_east * t
         centre.append([x.mean(), y.mean()])
-        time.append(simulation["t"][use].mean())
+        time.append(t.mean())
         size.append(0.5 * (np.ptp(x) + np.ptp(y)))
     t = np.array(time) - np.mean(time)
     place = np.array(centre) - np.mean(centre, axis=0)

@@ -160,7 +160,7 @@ def encounter_of(waves: Waves, time: Array, north: Array, east: Array) -> Encoun
     ----------
     waves : One component.
     time : (n,) [s].
-    north, east : (n,) track of the body origin over ground [m].
+    north, east : (n,) track of the body origin over ground [m]; a current that carries the waves is taken off.
 
     Raises
     ------
@@ -171,6 +171,7 @@ def encounter_of(waves: Waves, time: Array, north: Array, east: Array) -> Encoun
         text = "one regular wave; for irregular seas ident.metrics.seaway"
         raise InputError("harmonics in waves", f"{waves.amplitude.size} wave components", text)
     # A line through the whole track: oscillation and noise of single samples average out.
+    north, east = north - waves.flow_north * time, east - waves.flow_east * time
     line = np.polynomial.polynomial.polyfit(time - time.mean(), np.column_stack([north, east]), 1)
     k, omega = float(waves.number[0]), float(waves.frequency[0])
     along = line @ np.array([float(waves.north[0]), float(waves.east[0])])

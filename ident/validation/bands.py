@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import math
 import os
 import shutil
@@ -33,6 +34,7 @@ from sim.kernel.assemble import Assembly
 from sim.waves.in_waves import Water
 
 Array = NDArray[np.float64]
+_log = logging.getLogger(__name__)
 # Samples handed out at once: enough that handing out costs nothing, few enough for a progress bar.
 CHUNK = 8
 # Of a machine that does not say how much memory it has [bytes].
@@ -334,6 +336,8 @@ def fly_samples(
             stacks.put(i, one)
         each(len(chunk_flown))
     flown = stacks.flown
+    said = {"case": case.name, "samples": samples, "seed": seed, "without_equilibrium": int((~flown).sum())}
+    _log.info("samples flown", extra=said)
     if not flown.any():
         raise InputError(f"case {case.name}", "no sample has a self-propulsion state", "smaller errors or another case")
     kept = {source: _without_failed(stack, flown) for source, stack in stacks.records.items()}

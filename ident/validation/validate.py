@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 from collections.abc import Collection
 from dataclasses import replace
@@ -31,6 +32,7 @@ from sim.flight.series import Series, read_series
 from sim.flight.simulate import CHANNELS, Simulation, fly
 
 Array = NDArray[np.float64]
+_log = logging.getLogger(__name__)
 _FRAMES = {
     "source": FrameData(x="aft", y="starboard", z="up"),
     "program": FrameData(x="forward", y="starboard", z="down"),
@@ -245,6 +247,8 @@ def validate(
     grid, metrics = with_grid(flown, ship, model, measures.metrics)
     outside, constant = outside_tables(simulation, boat.coefficients, model)
     met = _passed(flown, channel_errors) and _published_met(flown, metrics)
+    ended = {"ends_s": float(simulation.end[0]), "records": len(simulation.record)}
+    _log.info("case flown", extra={"case": flown.name, "vehicle": ship.name, "version": boat.commit.number} | ended)
     return Validation(
         case=flown,
         simulation=simulation,

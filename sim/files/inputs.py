@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 from collections.abc import Iterable
 from contextvars import ContextVar
@@ -9,6 +10,7 @@ from pathlib import Path
 
 from sim.files.errors import InputError
 
+_log = logging.getLogger(__name__)
 # Files of statements are written by hand [bytes]; data stand in tables.
 _LARGEST_STATEMENT = 1 << 24
 _read: ContextVar[set[Path] | None] = ContextVar("files a command has read", default=None)
@@ -32,6 +34,7 @@ def noted() -> frozenset[Path] | None:
 
 def note(path: Path) -> None:
     """A file is read."""
+    _log.debug("file read", extra={"file": str(path)})
     files = _read.get()
     if files is not None:
         files.add(Path(os.path.realpath(path)))

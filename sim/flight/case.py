@@ -144,9 +144,11 @@ class Case(Data):
     tolerance: list[Tolerance] = Field(default_factory=list)
 
     @model_validator(mode="after")
-    def _no_waves_on_a_current(self) -> Case:
-        if self.waves and self.environment.varies:
-            raise ValueError("waves on a current or over layers are not modelled; one of them in a case")
+    def _no_waves_over_layers(self) -> Case:
+        if self.waves and self.environment.varies_over_depth:
+            raise ValueError(
+                "waves over layers or with a pressed hull are not modelled; one of them in a case"
+            )
         return self
 
     @model_validator(mode="after")

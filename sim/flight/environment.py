@@ -48,7 +48,8 @@ class EnvironmentData(Data):
     density_kgpm3 : Of the water [kg/m^3]; where there are layers, that of the tables' loads and of the hull's stated
         displacement.
     gravity_mps2 : Gravity [m/s^2].
-    current : Of the water; velocities of the boat are then through the water, its place over ground.
+    current : Of the water; velocities of the boat are then through the water, its place over ground, and waves are
+        those in the water that it carries.
     layer : Density over depth: buoyancy and loads follow it, the added mass does not.
     hull_compressibility_perm : Share of its volume that the hull loses a metre of depth [1/m].
     free_surface : The hull may come out of the water and loses buoyancy and added mass there; always so in
@@ -67,14 +68,14 @@ class EnvironmentData(Data):
         depths = [one.depth_m for one in self.layer]
         if any(b <= a for a, b in pairwise(depths)):
             raise ValueError("layers stand from shallow to deep, each at a depth of its own")
-        if self.free_surface and self.varies:
-            raise ValueError("current, layer and hull_compressibility_perm are for deep water, without free_surface")
+        if self.free_surface and self.varies_over_depth:
+            raise ValueError("layer and hull_compressibility_perm are for deep water, without free_surface")
         return self
 
     @property
-    def varies(self) -> bool:
-        """Whether there is a current, or anything that changes over depth."""
-        return bool(self.current or self.layer or self.hull_compressibility_perm)
+    def varies_over_depth(self) -> bool:
+        """Whether water or hull change over depth."""
+        return bool(self.layer or self.hull_compressibility_perm)
 
 
 class WavesData(Data):

@@ -34,7 +34,9 @@ class LineOfSight:
 
     Examples
     --------
-    >>> path = LineOfSight([(0.0, 0.0), (1000.0, 0.0)], ahead=100.0)
+    >>> import ident
+    >>> import numpy as np
+    >>> path = ident.LineOfSight([(0.0, 0.0), (1000.0, 0.0)], ahead=100.0)
     >>> state = np.zeros(12)
     >>> state[[0, 6, 7]] = 5.0, 200.0, 60.0  # heading north, 60 m east of the leg
     >>> round(float(path.yaw_rate(state)), 6), float(path.offset(state))

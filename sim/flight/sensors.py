@@ -26,7 +26,8 @@ class Sensors:
 
     Examples
     --------
-    >>> sensors = Sensors(noise={"psi": 0.002, "z": 0.1}, bias={"z": 0.05}, seed=1)
+    >>> import ident
+    >>> sensors = ident.Sensors(noise={"psi": 0.002, "z": 0.1}, bias={"z": 0.05}, seed=1)
     >>> sensors.channels
     ('psi', 'z')
     """

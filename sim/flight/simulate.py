@@ -289,13 +289,27 @@ def model_of(case: Case, coefficients: Coefficients) -> Model:
 
 
 def waves_of(case: Case) -> Waves:
-    """Wave components of a case; none in calm water.
+    """Wave components of a case, carried by its current; none in calm water.
 
     Raises
     ------
     InputError
         When the case asks for a sea state that the table does not have, or for waves that would break.
     """
+    north, east = flow_of(case)
+    return _in_still_water(case)._replace(flow_north=north, flow_east=east)
+
+
+def flow_of(case: Case) -> tuple[float, float]:
+    """Velocity of the water over ground, north and east [m/s]."""
+    current = case.environment.current
+    if current is None:
+        return 0.0, 0.0
+    direction = math.radians(current.direction_deg)
+    return current.speed_mps * math.cos(direction), current.speed_mps * math.sin(direction)
+
+
+def _in_still_water(case: Case) -> Waves:
     density, gravity = case.environment.density_kgpm3, case.environment.gravity_mps2
     data = case.waves
     if data is None:
@@ -343,9 +357,7 @@ def _in_water(case: Case, model: Model) -> Model:
     """The model in a current, layers of density, and a hull that is pressed together."""
     water = case.environment
     if water.current:
-        direction = math.radians(water.current.direction_deg)
-        speed = water.current.speed_mps
-        model = model.replaced(current=(speed * math.cos(direction), speed * math.sin(direction)))
+        model = model.replaced(current=flow_of(case))
     if water.layer or water.hull_compressibility_perm:
         depths = [one.depth_m for one in water.layer] or [0.0]
         ratios = [one.density_kgpm3 / water.density_kgpm3 for one in water.layer] or [1.0]
@@ -362,7 +374,7 @@ def equipped(case: Case, vehicle: Vehicle, model: Model) -> Model:
     InputError
         When the vehicle has no tanks.
     """
-    if case.environment.varies:
+    if case.environment.current or case.environment.varies_over_depth:
         model = _in_water(case, model)
     if not uses_tanks(case):
         return model

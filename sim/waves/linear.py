@@ -28,6 +28,8 @@ class Waves(NamedTuple):
     amplitude : (n,) [m]; number : (n,) k [1/m]; frequency : (n,) omega [rad/s].
     north, east : (n,) cos chi and sin chi of the direction each travels to.
     phase : (n,) epsilon [rad]; density [kg/m^3]; gravity [m/s^2].
+    flow_north, flow_east : Velocity of the water that carries the waves [m/s]. All of the above is meant in that
+    water: at a place that does not move, a component passes with omega + k . flow.
     No component means calm water, which costs nothing and changes no digit.
     """
 
@@ -39,6 +41,8 @@ class Waves(NamedTuple):
     phase: Array
     density: float
     gravity: float
+    flow_north: float = 0.0
+    flow_east: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -141,6 +145,7 @@ def kinematics(waves: Waves, points: Array, time: Array | float) -> Kinematics:
     points = np.asarray(points, dtype=float)
     x, y, z = (points[..., i, None] for i in range(3))
     t = np.asarray(time, dtype=float)[..., None]
+    x, y = x - waves.flow_north * t, y - waves.flow_east * t
     theta = waves.number * (waves.north * x + waves.east * y) - waves.frequency * t + waves.phase
     decay = waves.amplitude * np.exp(-waves.number * z)
     c, s = decay * np.cos(theta), decay * np.sin(theta)

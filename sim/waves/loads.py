@@ -215,8 +215,10 @@ def _place(sea: Sea, y: Array, time: float, pas: Passage) -> None:
         pas.place[i, 2] -= top
     for i in range(gauge + 1, sea.points.shape[0]):
         pas.place[i, 2] = pas.motion[i, 2] = 0.0
+    # Where the boat is in the water that carries the waves.
+    north, east = y[6] - w.flow_north * time, y[7] - w.flow_east * time
     for j in range(w.amplitude.size):
-        angle = w.number[j] * (w.north[j] * y[6] + w.east[j] * y[7]) - w.frequency[j] * time + w.phase[j]
+        angle = w.number[j] * (w.north[j] * north + w.east[j] * east) - w.frequency[j] * time + w.phase[j]
         angle -= TWO_PI * floor(angle / TWO_PI)
         size = w.amplitude[j] * w.frequency[j] * exp(-w.number[j] * top)
         # Acceleration is the velocity a quarter period earlier times the frequency.

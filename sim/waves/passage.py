@@ -22,8 +22,9 @@ WATER_RATE = IMPULSE
 
 
 @inner
-def _predict(y: Array, h: float, gain: Array, matrix: Array, out: Array) -> None:
-    """State after h when the velocities change by ``gain``, second order in h."""
+def _predict(sea: Sea, y: Array, gain: Array, matrix: Array, out: Array) -> None:
+    """State after a span when the velocities change by ``gain``, second order in its length."""
+    h = sea.span
     mean = np.empty(6)
     for k in range(6):
         mean[k] = y[k] + 0.5 * gain[k]
@@ -39,6 +40,8 @@ def _predict(y: Array, h: float, gain: Array, matrix: Array, out: Array) -> None
         phi, theta, psi = y[9] + 0.5 * h * dphi, y[10] + 0.5 * h * dtheta, y[11] + 0.5 * h * turn
     for k in range(3):
         out[6 + k] = y[6 + k] + h * (matrix[k, 0] * mean[0] + matrix[k, 1] * mean[1] + matrix[k, 2] * mean[2])
+    out[6] += h * sea.waves.flow_north
+    out[7] += h * sea.waves.flow_east
     out[9], out[10], out[11] = y[9] + h * dphi, y[10] + h * dtheta, y[11] + h * turn
 
 
@@ -81,7 +84,7 @@ def advance(sea: Sea, y: Array, time: float, pas: Passage) -> None:
         evaluate(sea, y, time, pas, pas.value[0], pas.slope[0])
     pas.time[0] = time
     pas.time[1] = time + sea.span
-    _predict(y, sea.span, gain, pas.matrix, pas.state)
+    _predict(sea, y, gain, pas.matrix, pas.state)
     evaluate(sea, pas.state, pas.time[1], pas, pas.value[1], pas.slope[1])
 
 

@@ -227,8 +227,8 @@ def froude_krylov(w: Waves, q: Quadrature, y: Array, time: float, out: Array) ->
     fill_rotation(y[9], y[10], y[11], m)
     for i in range(q.volumes.size):
         a, b, c = q.points[i, 0], q.points[i, 1], q.points[i, 2]
-        x = y[6] + m[0, 0] * a + m[0, 1] * b + m[0, 2] * c
-        yy = y[7] + m[1, 0] * a + m[1, 1] * b + m[1, 2] * c
+        x = y[6] - w.flow_north * time + m[0, 0] * a + m[0, 1] * b + m[0, 2] * c
+        yy = y[7] - w.flow_east * time + m[1, 0] * a + m[1, 1] * b + m[1, 2] * c
         z = y[8] + m[2, 0] * a + m[2, 1] * b + m[2, 2] * c
         north, east, down = 0.0, 0.0, 0.0
         for j in range(w.amplitude.size):
