@@ -13,9 +13,11 @@ import xarray as xr
 from click.testing import CliRunner
 from flights_in_waves import made_flight
 
+import ident
 from ident.cli import main
 from ident.exports.history import history_of, sampled, samples_dataset, write_history
 from ident.validation.bands import Bands
+from ident.validation.figures import _draw
 from sim.boat.vehicle import load_vehicle
 from sim.files.errors import InputError
 from sim.flight.case import load_case
@@ -119,6 +121,47 @@ def test_what_cannot_be_written_is_refused_and_leaves_nothing(fitted_db, tmp_pat
     assert done.exit_code == 2, done.output
     assert said in done.output
     assert not list(tmp_path.iterdir())
+
+
+def test_loads_beside_the_motion_balance_as_the_table_of_loads(fitted_db, tmp_path):
+    path = tmp_path / "roll.nc"
+    asked = ["fly", "--case", "roll-decay", "--db", fitted_db, "--loads", "part", "--out", str(path)]
+    done = CliRunner().invoke(main, asked)
+    assert done.exit_code == 0, done.output
+    data = xr.load_dataset(path, engine="scipy")
+    parts = [str(n) for n in data.variables if str(n).startswith("K_")]
+    assert {"K_hull", "K_weight_and_buoyancy", "K_added_mass"} <= set(parts)
+    assert data["K_hull"].attrs["units"] == "N m"
+    size = float(np.abs(data["K_weight_and_buoyancy"]).max())
+    assert np.abs(sum(data[n] for n in parts))[5:-5].max() < 0.02 * size
+
+
+def test_every_series_of_a_figure_can_be_drawn_again_from_the_histories(fitted_db, tmp_path):
+    """Each line of the figure of a zigzag that is of the boat stands in its history, to the last digit."""
+    out = tmp_path / "out"
+    asked = ["validate", "--case", "vzz10-10kt", "--db", fitted_db, "--out", str(out), "--history", "--samples", "2"]
+    done = CliRunner().invoke(main, asked)
+    assert done.exit_code == 0, done.output
+    case, version = load_case("vzz10-10kt")[0], next(out.glob("*_samples.nc")).name.split("_v")[1].split("_")[0]
+    own = sorted(p.stem.split(f"_v{version}_")[1] for p in out.glob(f"*_v{version}_*.csv"))
+    assert own == sorted(s for s in case.reference.compare if case.started_as(s))
+    flown = ident.validate("vzz10-10kt", fitted_db)
+    figure, _ = _draw(flown, None)
+    lines = [
+        line for axis in figure.axes for line in axis.get_lines() if len(line.get_xdata()) == len(flown.simulation["t"])
+    ]
+    table = pd.read_csv(out / f"vzz10-10kt_v{version}.csv", comment="#", float_precision="round_trip")
+    written = [table[c].to_numpy() for c in table] + [
+        np.degrees(table[c]) for c in table if c.endswith(("_rad", "_radps"))
+    ]
+    for line in lines:
+        x, y = line.get_data()
+        assert any(np.array_equal(x, one) for one in written)
+        if not str(line.get_label()).startswith("simulated as"):
+            assert any(np.allclose(y, one, rtol=1e-15, atol=1e-15) for one in written), line.get_label()
+    assert len(lines) > 5
+    samples = xr.load_dataset(next(out.glob("*_samples.nc")), engine="scipy")
+    assert samples.sizes["sample"] == 2
 
 
 def test_the_command_writes_the_flight_and_says_what_it_wrote(fitted_db, tmp_path):

@@ -17,6 +17,12 @@ from ident.text import on_screen
 @VERSION
 @out_file("File to write, .csv, .parquet or .nc; CASE_vVERSION.csv by default.")
 @click.option("--every", type=click.FloatRange(min=0, min_open=True), default=None, help="Seconds between records.")
+@click.option(
+    "--loads",
+    type=click.Choice(["part", "coefficient"]),
+    default=None,
+    help="Also the loads on the boat over time, by part or by term.",
+)
 @click.option("--samples", type=click.IntRange(min=2), default=None, help="To .nc: so many sets drawn from the errors.")
 @click.option("--seed", type=click.IntRange(min=0), default=None, help="With --samples: seed of the draws, 0 without.")
 @click.option("--quantiles", default=None, metavar="Q,Q,...", help="With --samples: curves at these shares, 0 to 1.")
@@ -28,6 +34,7 @@ def fly(
     version: int | None,
     out: Path | None,
     every: float | None,
+    loads: str | None,
     samples: int | None,
     seed: int | None,
     quantiles: str | None,
@@ -40,15 +47,18 @@ def fly(
     \b
     Example: ident fly --case hzz20 --out hzz20.csv
              ident fly --case ss5-4m --every 0.5 --out ss5.nc
+             ident fly --case hzz20 --loads part --out loads.parquet
              ident fly --case hzz20 --samples 200 --quantiles 0.025,0.5,0.975 --out band.nc
     """
+    if samples and loads:
+        raise click.UsageError("--loads goes with one flight, without --samples")
     if not samples and (quantiles or seed is not None):
         raise click.UsageError("--quantiles and --seed go with --samples")
     from ident.exports.fly import fly_to_file
 
     console = console_for(quiet=json_path == "-")
     with equilibrium_of(case), console.status("flying the case"):
-        done = fly_to_file(case, db, version, vehicle, out, every, samples, seed or 0, _shares(quantiles))
+        done = fly_to_file(case, db, version, vehicle, out, every, samples, seed or 0, _shares(quantiles), loads)
     console.print(f"history: {on_screen(done['file'])}, {done['records']} records", highlight=False)
     if json_path:
         emit(done, json_path)

@@ -33,6 +33,7 @@ class ValidateOptions:
     out: Path
     json_path: str | None
     figures: str
+    history: str | None
     strict: bool
     samples: int | None
     seed: int
@@ -79,6 +80,14 @@ class ValidateOptions:
 @OUT
 @json_to("Write the comparison as JSON.")
 @click.option("--figures", type=click.Choice(["png", "svg", "pdf"]), default="png", show_default=True, help="Format.")
+@click.option(
+    "--history",
+    type=click.Choice(["csv", "parquet", "nc"]),
+    is_flag=False,
+    flag_value="csv",
+    default=None,
+    help="Also write every flight to --out, as CSV without a word.",
+)
 @click.option("--strict", is_flag=True, help="Exit 1 when a tolerance of a case file is missed.")
 @click.option("--samples", type=click.IntRange(min=2), default=None, help="Draw so many coefficient sets; error bands.")
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Seed of the draws.")
@@ -117,6 +126,7 @@ def validate(**options: Any) -> None:
              ident validate --case hzz20 --samples 1000
              ident validate --case hzz20 --without N_cross --without even_loads
              ident validate --case hzz20 --loads part
+             ident validate --case hzz20 --history nc
              ident validate --case hzz20 --samples 100000 --dask tcp://scheduler:8786
              ident validate --case turn20-4m --reference mine.csv --frame program
              ident validate --case turning-circle --vehicle my_boat.toml --speed 1.5 --angle 15
@@ -134,6 +144,8 @@ def validate(**options: Any) -> None:
         board = board and _board_with_bands(board, done, asked, console)
     for figure in _figures(done, asked.out, asked.figures):
         console.print(f"figure: {on_screen(figure)}", highlight=False)
+    if asked.history:
+        _histories(done, asked.out, asked.history, console)
     by_source = _loads(done[0], asked.loads, asked.out, console) if asked.loads else {}
     if asked.json_path:
         result = done[0].to_dict() | by_source if board is None else board.to_dict()
@@ -157,6 +169,14 @@ def _loads(done: Validation, by: str, out: Path, console: Any) -> dict[str, Any]
     time = table.loc[table["source"] == table["source"].iloc[0], "t_s"]
     listed = {name: {c: rows[c].tolist() for c in rows} for name, rows in sources.items()}
     return {"loads": {"by": by, "t_s": time.tolist(), "sources": listed}}
+
+
+def _histories(done: list[Validation], out: Path, kind: str, console: Any) -> None:
+    from ident.exports.validated import write_histories
+
+    for one in done:
+        for path in write_histories(one, out, kind):
+            console.print(f"history: {on_screen(path)}", highlight=False)
 
 
 def _figures(done: list[Validation], out: Path, kind: str) -> list[Path]:

@@ -11,11 +11,13 @@ from ident.exports.history import (
     history_of,
     sampled,
     samples_dataset,
+    with_loads,
     write_history,
 )
 from ident.output import whole
 from ident.validation.bands import fly_samples
 from ident.validation.boats import Fleet
+from ident.validation.loads import loads_by_part
 from sim.boat.vehicle import load_vehicle
 from sim.files.errors import InputError
 from sim.flight.case import load_case
@@ -32,6 +34,7 @@ def fly_to_file(
     samples: int | None = None,
     seed: int = 0,
     quantiles: tuple[float, ...] = (),
+    loads: str | None = None,
 ) -> dict[str, Any]:
     """Fly a case and write its history.
 
@@ -42,6 +45,7 @@ def fly_to_file(
     vehicle_name : Bundled vehicle or path to a vehicle file, instead of the case's.
     out : ``.csv``, ``.parquet`` or ``.nc``; named after case and version when None.
     every : Time between records [s], as the case says when None.
+    loads : ``part`` or ``coefficient``: loads on the boat from each of them beside the motion, see ``with_loads``.
     samples, seed, quantiles : Coefficient sets drawn from the errors, to ``.nc``; see ``samples_dataset``.
 
     Returns
@@ -76,6 +80,8 @@ def fly_to_file(
         return said | {"records": len(bands.time), "ends_s": float(bands.time[-1]), "samples": len(bands.draws)}
     simulation = fly(case, vehicle, boat.model(case), boat.water(case))
     history = history_of(simulation, vehicle, attributes)
+    if loads:
+        history = with_loads(history, loads_by_part(case, boat, simulation, loads))
     if not all(map(_finite, history.values.values())):
         raise InputError(f"case {case.name}", f"not finite after {simulation['t'][-1]:.1f} s", "a flight that holds")
     write_history(history, path)

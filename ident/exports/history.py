@@ -23,6 +23,7 @@ from sim.flight.simulate import CHANNELS, Simulation
 from sim.waves.linear import kinematics
 
 if TYPE_CHECKING:
+    import pandas as pd
     import xarray
 
     from ident.validation.bands import Bands
@@ -31,6 +32,7 @@ Array = NDArray[np.float64]
 FORMATS = (".csv", ".parquet", ".nc")
 # Unit -> how it ends the name of a column.
 _ENDINGS = {"s": "s", "m": "m", "m/s": "mps", "rad": "rad", "rad/s": "radps", "1/s": "rps", "kg": "kg", "-": ""}
+_ENDINGS |= {"N": "N", "N m": "Nm"}
 # Names of the CF conventions, where they have one for the quantity.
 _STANDARD = {"phi": "platform_roll", "theta": "platform_pitch", "psi": "platform_yaw"}
 _MEANING = {
@@ -175,6 +177,32 @@ def history_of(simulation: Simulation, vehicle: Vehicle, attributes: Mapping[str
     units |= {"alpha": "rad", "beta": "rad", "sail_top_submergence": "m"}
     meaning = {name: _MEANING.get(name, "") for name in values} | {p: f"deflection of {p}" for p in planes}
     return History(values, units, meaning, dict(attributes))
+
+
+def with_loads(history: History, table: pd.DataFrame) -> History:
+    """A flight with the loads on the boat beside its motion.
+
+    Parameters
+    ----------
+    history : Of the flight.
+    table : Its loads by part or by term, from ``ident.validation.loads.loads_by_part``.
+
+    Returns
+    -------
+    History with a series ``X_<source>`` ... ``N_<source>`` of every load that a source has [N, N m], about the body
+    origin in the program frame.
+    """
+    values, units, meaning = dict(history.values), dict(history.units), dict(history.meaning)
+    for source, rows in table.groupby("source", sort=False):
+        for column in rows.columns.drop(["t_s", "source"]):
+            load = rows[column].to_numpy()
+            if not load.any():
+                continue
+            output, unit = column.split("_")
+            name = f"{output}_{str(source).replace(' ', '_')}"
+            values[name], units[name] = load, "N" if unit == "N" else "N m"
+            meaning[name] = f"{output} of {source} on the boat, about the body origin"
+    return History(values, units, meaning, history.attributes)
 
 
 def _sail_top(simulation: Simulation, vehicle: Vehicle) -> Array:

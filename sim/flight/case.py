@@ -146,9 +146,7 @@ class Case(Data):
     @model_validator(mode="after")
     def _no_waves_over_layers(self) -> Case:
         if self.waves and self.environment.varies_over_depth:
-            raise ValueError(
-                "waves over layers or with a pressed hull are not modelled; one of them in a case"
-            )
+            raise ValueError("waves over layers or with a pressed hull are not modelled; one of them in a case")
         return self
 
     @model_validator(mode="after")
