@@ -21,6 +21,12 @@ from ident.text import on_screen, visible
 @click.option(
     "--beside", type=int, multiple=True, metavar="N", help="Another version in the interactive figures; repeatable."
 )
+@click.option(
+    "--scoreboard",
+    type=click.Path(path_type=Path),
+    default=None,
+    help="JSON of `ident validate --all`: errors of flights, linked to the values behind them.",
+)
 @json_to("Write what the page shows as JSON.")
 def report(
     db: str,
@@ -29,6 +35,7 @@ def report(
     out: Path,
     interactive: bool,
     beside: tuple[int, ...],
+    scoreboard: Path | None,
     json_path: str | None,
 ) -> None:
     """Write one self-contained HTML page on each vehicle of a database version.
@@ -38,6 +45,7 @@ def report(
     \b
     Example: ident report --version 0
              ident report --version 2 --interactive --beside 0
+             ident validate --all --json board.json && ident report --vehicle bb2 --scoreboard board.json
     """
     from ident.report.interactive import plotly
     from ident.report.page import reported_vehicles, write_report
@@ -51,7 +59,7 @@ def report(
     done = []
     for name in [vehicle] if vehicle else reported_vehicles(db, version):
         with console.status(f"drawing every coefficient of {on_screen(name)}"):
-            done.append(write_report(db, version, out, name, interactive, beside, workers=0))
+            done.append(write_report(db, version, out, name, interactive, beside, 0, scoreboard))
         console.print(f"report: {on_screen(done[-1]['file'])}", highlight=False)
     if json_path:
         emit(done[0] if len(done) == 1 else done, json_path)

@@ -20,6 +20,7 @@ from ident.fitting.notes import group_unused, group_warnings
 from ident.output import whole
 from ident.report.figures import draw_figures, equations, quality_colours
 from ident.report.interactive import Drawn, write_interactive
+from ident.report.score import read_score
 from ident.report.values import Run, runs_of, term_anchor, term_pages
 from ident.report.values import number as _figure
 from sim.boat import catalogue
@@ -296,6 +297,7 @@ def write_report(
     interactive: bool = False,
     beside: Sequence[int] = (),
     workers: int = 1,
+    scoreboard: Path | None = None,
 ) -> dict[str, Any]:
     """Write the report of one vehicle at one database version.
 
@@ -308,6 +310,8 @@ def write_report(
     interactive : Write a page with figures to turn and slice beside it, ``<vehicle>_v<version>_interactive.html``.
     beside : Other versions drawn in the interactive figures.
     workers : Processes that draw the figures; 0 for all cores. The page does not depend on it.
+    scoreboard : JSON of ``ident validate --all`` of the same version: its errors stand on the page, each leading to the
+        values that its flight was computed from.
 
     Returns
     -------
@@ -317,13 +321,15 @@ def write_report(
     Raises
     ------
     InputError
-        When database, version or vehicle do not exist, or the page cannot be written.
+        When database, version or vehicle do not exist, the scoreboard is of another version, or the page cannot be
+        written.
     """
     from jinja2 import Environment as Templates
     from jinja2 import PackageLoader, StrictUndefined
 
     boat = load_vehicle(vehicle)
     rows, number = read_rows(db, version, boat.name)
+    rows = rows.reset_index(drop=True)
     loader = PackageLoader("ident", "report")
     templates = Templates(
         loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
@@ -336,7 +342,8 @@ def write_report(
         shown = [Drawn(n, *_drawn(db, n, boat.name)) for n in dict.fromkeys((number, *beside))]
         write_interactive(boat, shown, page_of_figures, path.name)
     content = _content(db, number, boat, rows, commit, workers) | {
-        "interactive": page_of_figures.name if interactive else ""
+        "interactive": page_of_figures.name if interactive else "",
+        "score": read_score(scoreboard, commit.digest, len(rows)) if scoreboard else None,
     }
     page = templates.get_template("report.html.j2").render(content)
     with whole(path) as part:

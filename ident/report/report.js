@@ -41,17 +41,28 @@ for (const head of document.querySelectorAll("table.sortable th")) {
 }
 const box = document.getElementById("search"), hits = document.getElementById("hits");
 let waiting;
+// A number of the scoreboard shows the values that its flight was computed from.
+const cases = new Map();
+for (const link of document.querySelectorAll("a[data-case]")) {
+  cases.set(link.dataset.name.toLowerCase().replace(/\s+/g, "_"), link.dataset.case);
+  link.addEventListener("click", () => {
+    box.value = "case:" + link.dataset.name.replace(/\s+/g, "_") + " ";
+    box.dispatchEvent(new Event("input"));
+  });
+}
 box?.addEventListener("input", () => {
   clearTimeout(waiting);
   waiting = setTimeout(() => {
     const words = box.value.toLowerCase().replace(/\u2212/g, "-").split(/\s+/).filter(Boolean);
+    const flown = words.filter((w) => w.startsWith("case:")).map((w) => cases.get(w.slice(5)));
     let count = 0;
     for (const term of document.querySelectorAll("#values details.term")) {
       const name = term.querySelector("summary .sym").textContent.toLowerCase();
       let here = 0;
       for (const row of [...term.querySelectorAll("tr")].slice(1)) {
         const text = (name + " " + row.textContent).toLowerCase().replace(/\u2212/g, "-");
-        row.hidden = !words.every((w) => text.includes(w));
+        const behind = (row.dataset.cases || "").split(" ");
+        row.hidden = !words.every((w) => w.startsWith("case:") || text.includes(w)) || !flown.every((k) => behind.includes(k));
         here += !row.hidden;
       }
       term.hidden = words.length > 0 && !here;

@@ -62,6 +62,7 @@ class Value:
     quality : Most doubtful word of its runs.
     calibration : Group that multiplied it; empty in captive versions.
     runs : Runs it came from.
+    place : Among the version's rows of the vehicle, in their order.
     """
 
     part: str
@@ -74,6 +75,7 @@ class Value:
     quality: str
     calibration: str
     runs: tuple[Run, ...]
+    place: int
 
 
 @dataclass(frozen=True)
@@ -173,7 +175,7 @@ def _method(row: Any) -> str:
 
 def _values(term: Term, rows: pd.DataFrame, runs: dict[str, Run]) -> Iterable[Value]:
     columns = [catalogue.axes()[a].column for a in term.axes]
-    for row in rows.to_dict("records"):
+    for place, row in zip(rows.index, rows.to_dict("records"), strict=True):
         half = _HALF_95 * row["stderr"]
         yield Value(
             part=row["part"],
@@ -186,6 +188,7 @@ def _values(term: Term, rows: pd.DataFrame, runs: dict[str, Run]) -> Iterable[Va
             quality=row["quality"],
             calibration=row["calibration"],
             runs=tuple(runs[name] for name in row["runs"].split()),
+            place=int(place),
         )
 
 

@@ -8,6 +8,7 @@ from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from ident.validation.coverage import used_rows
 from ident.validation.reliability import Reliability, mean_shares, ranks, reliability
 
 if TYPE_CHECKING:
@@ -85,12 +86,17 @@ class BoardCase:
     failed: str | None = None
 
     def to_dict(self) -> dict[str, Any]:
-        """The case for a program to read: as ``Validation.to_dict``, with ``parent`` and ``trained``."""
+        """The case for a program to read: as ``Validation.to_dict``, with ``parent`` and ``trained``.
+
+        ``rows`` names the values behind the flight: term to places among the version's rows of the vehicle.
+        """
         if self.validation is None:
             nothing: dict[str, Any] = {"references": {}, "metrics": {}, "outside_tables": [], "passed": False}
             plain = {"case": self.name, "database": self.database, **nothing, "failed": self.failed}
         else:
             plain = self.validation.to_dict()
+            done = self.validation
+            plain["rows"] = used_rows(done.simulation, done.boat.coefficients, done.boat.model(done.case))
             plain["references"] = {
                 source: {channel: e.to_dict() for channel, e in channels.items()}
                 for source, channels in (self.errors or {}).items()

@@ -1,4 +1,4 @@
-"""How long a flight used each term beyond the data it was identified from."""
+"""What a flight used of the tables: the values behind it, and how long each term beyond its data."""
 
 from __future__ import annotations
 
@@ -17,6 +17,8 @@ from sim.kernel.layout import Model, workspace
 Array = NDArray[np.float64]
 # Samples of a record that are looked at: enough for a share of time.
 _COVERAGE_SAMPLES = 200
+# Those at which the rows behind a flight are looked up: neighbours in time use the same ones.
+_ROW_SAMPLES = 40
 
 
 @dataclass(frozen=True)
@@ -34,9 +36,9 @@ class OutsideUse:
     fraction_of_time: float
 
 
-def _features(simulation: Simulation, model: Model) -> Array:
+def _features(simulation: Simulation, model: Model, samples: int = _COVERAGE_SAMPLES) -> Array:
     """(samples, features) of the kernel at evenly spread samples of a record."""
-    chosen = np.unique(np.linspace(0, len(simulation.record) - 1, _COVERAGE_SAMPLES).astype(int))
+    chosen = np.unique(np.linspace(0, len(simulation.record) - 1, samples).astype(int))
     record = np.ascontiguousarray(simulation.record[chosen])
     work = workspace(model)
     features = np.empty((len(chosen), work.features.size))
@@ -44,6 +46,33 @@ def _features(simulation: Simulation, model: Model) -> Array:
         kernel.features(model, sample[STATE:CONTROLS], sample[CONTROLS:-COMMANDED], work)
         row[:] = work.features
     return features
+
+
+def used_rows(simulation: Simulation, coefficients: Coefficients, model: Model) -> dict[str, list[int]]:
+    """Which tabulated values a flight was computed from.
+
+    Parameters
+    ----------
+    simulation, coefficients, model : A flight, and what was flown.
+
+    Returns
+    -------
+    Term -> places among the version's rows of the vehicle, in their order, that had a weight in its tables at one of
+    40 instants spread over the flight.
+    """
+    features = _features(simulation, model, _ROW_SAMPLES)
+    planes = [p.name for p in coefficients.vehicle.planes]
+    used: dict[str, set[int]] = {}
+    for coefficient in coefficients:
+        term = coefficient.term
+        places = coefficients.places[term.name, coefficient.part]
+        chosen = np.ones(len(places), dtype=bool)
+        if term.axes and not term.is_acceleration:
+            plane = planes.index(coefficient.part) if coefficient.part in planes else -1
+            points = np.unique(features[:, [feature_index(a, plane) for a in term.axes]], axis=0)
+            chosen = np.max([np.abs(coefficient.table.weights(p.tolist())) for p in points], axis=0) > 0.0
+        used.setdefault(term.name, set()).update(places[chosen].tolist())
+    return {name: sorted(places) for name, places in used.items()}
 
 
 def outside_tables(

@@ -10,6 +10,7 @@ from ident.metrics.in_waves import BROACHING
 from ident.text import in_file_name
 from ident.validation.figures import case_figure
 from ident.validation.result import Validation
+from ident.validation.turn_figures import turn_figures
 from ident.validation.wave_figures import exceedance_figure, harmonics_figure, seaway_figure, spectrum_figure
 from sim.boat.database import version_words
 
@@ -24,7 +25,7 @@ def figures_of(done: Validation, folder: Path, kind: str = "png") -> list[Path]:
     kind : Suffix of the files.
     """
     path = folder / f"{in_file_name(done.case.name)}_v{done.version}.{kind}"
-    return [case_figure(done, path, done.bands), *sea_figures(done, folder, kind)]
+    return [case_figure(done, path, done.bands), *sea_figures(done, folder, kind), *turn_figures(done, folder, kind)]
 
 
 def sea_figures(done: Validation, folder: Path, kind: str = "png") -> list[Path]:
