@@ -105,7 +105,8 @@ def read_score(path: Path, digest: str, rows: int) -> Score:
     try:
         board = json.loads(inputs.statements(path))
         cases = [case for case in board["cases"] if case["database"]["digest"] == digest]
-        flown, behind = [], {}
+        flown: list[Flown] = []
+        behind: dict[int, list[int]] = {}
         for place, case in enumerate(cases):
             used = case.get("rows", {})
             for row in {row for places in used.values() for row in places}:
