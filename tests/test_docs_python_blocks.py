@@ -76,4 +76,6 @@ def test_the_boat_in_other_tools_runs_as_the_page_has_it(desk):
     for block in _blocks("docs/other-tools.md"):
         exec(compile(block, "docs/other-tools.md", "exec"), names)
     assert names["observation"].shape == (10,)
+    assert names["margin"] == pytest.approx(60.0, abs=1.0)
+    assert np.degrees(names["boat"]["psi"]) == pytest.approx(20.0, abs=0.2)
     assert names["phase_margin"] > 60.0
