@@ -95,9 +95,9 @@ def _panel(flight: Simulation, channel: str, axis: Any, travels: float) -> None:
     x = np.degrees(middle)
     axis.plot(x, mean, color="tab:red", lw=1.6, label="mean of the later turns")
     axis.fill_between(x, mean - spread, mean + spread, color="tab:red", alpha=0.2, lw=0)
-    for at, style, label in ((travels + np.pi, "--", "head sea"), (travels, ":", "following sea")):
+    for at, dashes, label in ((travels + np.pi, "--", "head sea"), (travels, ":", "following sea")):
         degrees = float(np.degrees(np.remainder(at, 2.0 * np.pi)))
-        axis.axvline(degrees, color="k", lw=0.9, ls=style, label=label)
+        axis.axvline(degrees, color="k", lw=0.9, ls=dashes, label=label)
     dress(axis, "", f"{name} [{unit}]")
     if channel in DOWNWARDS:
         axis.invert_yaxis()
