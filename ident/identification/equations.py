@@ -83,10 +83,18 @@ class Equations:
     sigma: Array
 
     def design(self, first: int) -> tuple[csr_array, csr_array]:
-        """Factors of the unknowns, nodes from ``first`` on, and of the known values: (equations, nodes) each."""
+        """Factors of the unknowns, nodes from ``first`` on, and of the known values: (equations, nodes) each.
+
+        What an earlier stage found is known, also to a test that would have identified it.
+        """
         top = 1 + max((max(f.unknowns, default=-1) for f in self.forms), default=-1)
-        unknowns = _matrix([f.unknowns for f in self.forms], first, max(top - first, 0))
-        known = _matrix([f.known for f in self.forms], 0, first)
+        sought = [{node: x for node, x in f.unknowns.items() if node >= first} for f in self.forms]
+        given = [
+            f.known | {node: x + f.known.get(node, 0.0) for node, x in f.unknowns.items() if node < first}
+            for f in self.forms
+        ]
+        unknowns = _matrix(sought, first, max(top - first, 0))
+        known = _matrix(given, 0, first)
         return unknowns[self.form], known[self.form]
 
 
@@ -95,6 +103,9 @@ def _matrix(rows: list[dict[int, float]], first: int, width: int) -> csr_array:
     ends = np.cumsum([0, *(len(r) for r in rows)])
     columns = np.array([node - first for r in rows for node in r], dtype=np.int64)
     data = np.array([factor for r in rows for factor in r.values()], dtype=float)
+    # Sparse products write where they are told to, also beside the matrix.
+    if columns.size and not 0 <= columns.min() <= columns.max() < width:
+        raise IndexError(f"nodes {columns.min() + first} to {columns.max() + first} of {first} to {first + width}")
     return csr_array((data, columns, ends), shape=(len(rows), width))
 
 
