@@ -1,4 +1,4 @@
-"""Authority: closed form: what an earlier stage found is a known value of a later one, and no place beside the matrix."""
+"""Authority: closed form: what an earlier stage found is known to a later one; no place stands beside a matrix."""
 
 from __future__ import annotations
 
