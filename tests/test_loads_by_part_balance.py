@@ -48,7 +48,7 @@ def test_they_balance_over_layers_and_in_a_pressed_hull(flown):
     """What is left of the sum of all sources, against the largest of them."""
     case, boat, _ = flown
     data = case.model_dump(exclude_none=True)
-    layers = [{"depth_m": 20.0, "density_kgpm3": 900.0}, {"depth_m": 60.0, "density_kgpm3": 950.0}]
+    layers = [{"depth_m": 20.0, "density_kgpm3": 960.0}, {"depth_m": 60.0, "density_kgpm3": 1010.0}]
     data["environment"] |= {"layer": layers, "hull_compressibility_perm": 1e-4}
     data["initial"] |= {"state": "as_given", "upright": False}
     data["run"]["duration_s"] = 15.0
