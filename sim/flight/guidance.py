@@ -29,8 +29,8 @@ class LineOfSight:
 
     References
     ----------
-    .. [Park2004] Park, S., Deyst, J. and How, J. P., "A new nonlinear guidance logic for trajectory tracking",
-       AIAA Guidance, Navigation and Control Conference, AIAA 2004-4900, 2004.
+    Park, S., Deyst, J. and How, J. P., "A new nonlinear guidance logic for trajectory tracking",
+    AIAA Guidance, Navigation and Control Conference, AIAA 2004-4900, 2004.
 
     Examples
     --------
