@@ -56,6 +56,12 @@ def _quiet_noise(x: Array, stride: int) -> float:
     return float(np.percentile(np.abs(apart), _QUIET)) / (_NORMAL * math.sqrt(_THIRD))
 
 
+def _ratio(now: float, then: float) -> float:
+    if then > 0.0:
+        return now / then
+    return math.inf if now > 0.0 else 0.0
+
+
 def thinned(record: Record, header: str) -> tuple[Record, str]:
     """Every k-th sample of a record, k as large as its noise is filtered; and what was seen, in words.
 
@@ -69,19 +75,23 @@ def thinned(record: Record, header: str) -> tuple[Record, str]:
     The record as it is, and no words, where its noise is white.
     """
     t, x = record.abscissa, record.value
-    strides, sizes = [1], [max(noise_of(t, x), _quiet_noise(x, 1))] if len(record) >= 2 * _FEWEST else [0.0]
+    before = (noise_of(t, x), _quiet_noise(x, 1)) if len(record) >= 2 * _FEWEST else (0.0, 0.0)
+    strides, sizes = [1], [max(before)]
     ended = False
     while sizes[0] > 0.0:
         k = 2 * strides[-1]
         if len(record) < k * _FEWEST or float(np.median(np.diff(t))) * k > _APART * float(t[-1] - t[0]):
             break
-        size = min(noise_of(t[::k], x[::k]), _quiet_noise(x, k))
+        here = (noise_of(t[::k], x[::k]), _quiet_noise(x, k))
+        # A filter makes both grow, a path that bends the one or the other.
+        growth = min(_ratio(now, then) for now, then in zip(here, before, strict=True))
         # Independent samples stay as they are; what grows after that is the path between them.
-        if size > _COARSE * sizes[-1] or size < _LEVEL * sizes[-1]:
-            ended = size < _LEVEL * sizes[-1]
+        if not _LEVEL <= growth <= _COARSE:
+            ended = growth < _LEVEL
             break
         strides.append(k)
-        sizes.append(size)
+        sizes.append(growth * sizes[-1])
+        before = here
     # What a size is known to: 1 / sqrt(2 n) of itself.
     known = 3.0 * math.sqrt(0.5 * strides[-1] / max(len(record), 1))
     steps = np.abs(np.diff(x))
