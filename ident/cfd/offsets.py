@@ -12,6 +12,7 @@ from ident.cfd.surfaces import closed_bodies, read_patches
 from ident.cfd.template import UNITS
 from ident.output import check_folder, whole
 from sim.files.errors import InputError
+from sim.hull.integral import trapezoid
 from sim.hull.mesh import Mesh
 
 Array = NDArray[np.float64]
@@ -201,5 +202,5 @@ def _volume(x: Array, radius: Array) -> float:
         hull = Hull(path)
     s = 0.5 * (1.0 - np.cos(np.linspace(0.0, np.pi, 401))) * x[-1]
     angle = np.linspace(0.0, np.pi, 181)
-    area = np.trapezoid(hull.radius(s, angle) ** 2, angle, axis=1)
-    return float(np.trapezoid(area, s))
+    area = trapezoid(hull.radius(s, angle) ** 2, angle, axis=1)
+    return float(trapezoid(area, s))

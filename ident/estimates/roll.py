@@ -24,6 +24,7 @@ from sim.boat.vehicle import Vehicle
 from sim.files.constants import constant
 from sim.files.errors import InputError
 from sim.hull.fins import fins_of, sail_fin
+from sim.hull.integral import trapezoid
 from sim.hull.lattice import Fin
 from sim.hull.slender import geometry_of, lines
 
@@ -71,7 +72,7 @@ def edge_drag(fins: list[Fin], angle: float) -> float:
         s = np.linspace(ends[0, 0], ends[-1, 0], 60)
         chord = np.interp(s, ends[:, 0], ends[:, 2] - ends[:, 1])
         drag = 0.5 * _PLATE * (2.0 * np.pi * angle * s / chord) ** _POWER
-        total += float(np.trapezoid(chord * drag * s**3, s))
+        total += float(trapezoid(chord * drag * s**3, s))
     return total
 
 

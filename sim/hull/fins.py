@@ -21,6 +21,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from sim.files.constants import constant
+from sim.hull.integral import trapezoid
 from sim.hull.lattice import Fin, in_cylinder, influence, lattice, normal_load
 from sim.hull.slender import Lines
 from sim.hull.surface import Geometry
@@ -102,7 +103,7 @@ def sail_fin(geometry: Geometry, folder: Path, hull: Lines) -> tuple[Fin, float]
     lead, trail = float(table["x_m"].min()), float(table["x_m"].max())
     forward = geometry.frame.frame.sign("x") * (0.5 * (lead + trail) - geometry.origin.value[0])
     deck = float(np.interp(forward, hull.x[::-1], hull.deck[::-1]))
-    top = float(np.trapezoid(table["z_top_m"], table["x_m"]) / (trail - lead))
+    top = float(trapezoid(table["z_top_m"], table["x_m"]) / (trail - lead))
     half = 0.5 * (deck + top)
     return Fin(((deck, lead, trail), (half, lead, trail), (top, lead, trail)), 0.5 * np.pi), deck
 

@@ -20,6 +20,7 @@ from sim.boat.vehicle import Vehicle
 from sim.files.constants import constant
 from sim.files.errors import InputError
 from sim.files.toml_files import read_toml
+from sim.hull.integral import trapezoid
 from sim.hull.surface import Geometry, hull_of
 
 Array = NDArray[np.float64]
@@ -59,12 +60,12 @@ class Lines:
     @property
     def volume(self) -> float:
         """[m^3]"""
-        return float(-np.trapezoid(self.area, self.x))
+        return float(-trapezoid(self.area, self.x))
 
     @property
     def wetted(self) -> float:
         """Wetted surface, the slope of the sections left out as in a slender body [m^2]."""
-        return float(-np.trapezoid(self.girth, self.x))
+        return float(-trapezoid(self.girth, self.x))
 
 
 def geometry_of(vehicle: Vehicle) -> tuple[Geometry, Path]:
@@ -98,10 +99,10 @@ def lines(vehicle: Vehicle) -> Lines:
     x = hull.x[0] + (hull.x[-1] - hull.x[0]) * 0.5 * (1.0 - np.cos(np.linspace(0.0, np.pi, _SECTIONS + 1)))
     angle = np.linspace(0.0, np.pi, 91)
     r = hull.radius(x, angle)
-    area = np.asarray(np.trapezoid(r**2, angle, axis=1))
+    area = np.asarray(trapezoid(r**2, angle, axis=1))
     step = np.hypot(np.gradient(r, angle, axis=1), r)
     forward = geometry.frame.frame.sign("x") * (x - geometry.origin.value[0])
-    return Lines(forward, area, np.asarray(2.0 * np.trapezoid(step, angle, axis=1)), r[:, 0])
+    return Lines(forward, area, np.asarray(2.0 * trapezoid(step, angle, axis=1)), r[:, 0])
 
 
 def spheroid(length: float, diameter: float) -> tuple[float, float, float]:
@@ -147,7 +148,7 @@ def hull_derivatives(hull: Lines, last: float | None) -> Array:
     kept = hull.x >= (hull.x[-1] if last is None else last)
     x, mass = hull.x[kept], (across - along) * hull.area[kept]
     left, at = (0.0, float(x[-1])) if last is None else (float(mass[-1]), float(x[-1]))
-    whole, first = float(-np.trapezoid(mass, x)), float(-np.trapezoid(mass * x, x))
+    whole, first = float(-trapezoid(mass, x)), float(-trapezoid(mass * x, x))
     return 2.0 * np.array([-left, -(at * left + whole), -at * left, -(at**2 * left + first)])
 
 
@@ -165,7 +166,7 @@ def hull_added_mass(hull: Lines) -> dict[str, float]:
     ``udot``, ``vdot`` [m^3], ``rdot`` [m^5] about the origin, ``vr`` [m^4] coupling of sway with yaw.
     """
     along, across, turned = spheroid(hull.length, 2.0 * float(hull.radius.max()))
-    moments = [float(-np.trapezoid(hull.area * hull.x**k, hull.x)) for k in range(3)]
+    moments = [float(-trapezoid(hull.area * hull.x**k, hull.x)) for k in range(3)]
     centre = moments[1] / moments[0]
     inertia = moments[2] - centre**2 * moments[0]
     return {

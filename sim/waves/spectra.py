@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.files.errors import InputError
+from sim.hull.integral import trapezoid
 from sim.waves.linear import Waves, calm, make_waves
 
 Array = NDArray[np.float64]
@@ -81,7 +82,7 @@ def jonswap(frequency: Array, height: float, peak: float, gamma: float = 3.3) ->
         return bretschneider(w, 1.0, peak) * gamma ** np.exp(-0.5 * ((w / peak - 1.0) / sigma) ** 2)
 
     grid = _grid(peak)
-    scale = height**2 / 16.0 / np.trapezoid(shape(grid), grid)
+    scale = height**2 / 16.0 / trapezoid(shape(grid), grid)
     return scale * shape(np.asarray(frequency, dtype=float))
 
 
@@ -91,7 +92,7 @@ def _grid(peak: float) -> Array:
 
 def moments(frequency: Array, density: Array, orders: tuple[int, ...] = (0, 1, 2)) -> Array:
     """Spectral moments m_n = int omega^n S d(omega) by the trapezoidal rule on a fine grid."""
-    return np.array([np.trapezoid(frequency**n * density, frequency) for n in orders])
+    return np.array([trapezoid(frequency**n * density, frequency) for n in orders])
 
 
 @dataclass(frozen=True)
