@@ -247,24 +247,24 @@ def _of_revolutions(one: Recording) -> tuple[float, float, str] | None:
 def paths(one: Recording, start: Start, spec: TrialFile) -> tuple[dict[str, SmoothPath], list[str]]:
     """Smooth paths of the channels from shortly before the execute on, rates taken with their angles."""
     taken: dict[str, list[Samples]] = {}
-    found: dict[str, SmoothPath] = {}
+    smoothed: dict[str, SmoothPath] = {}
     said: list[str] = []
     for name, record in one.channels.items():
         if name in ("dH", "dV", "dH_order", "course", "p", "q", "r", "udot", "n", "v", "w"):
             continue
         samples, path = _from_run_up(record, start.time, stated_noise(spec, name))
         if path is not None:
-            taken[name], found[name] = samples, smooth(samples)
-    alone: dict[str, SmoothPath] = {n: found[n] for n in ("psi", "theta", "phi") if n in found}
+            taken[name], smoothed[name] = samples, smooth(samples)
+    alone: dict[str, SmoothPath] = {n: smoothed[n] for n in ("psi", "theta", "phi") if n in smoothed}
     for name in alone:
         rate = {"psi": "r", "theta": "q", "phi": "p"}[name]
         if rate in one.channels:
-            found |= _with_rate(one, name, rate, taken[name], alone, spec, said)
+            smoothed |= _with_rate(one, name, rate, taken[name], alone, spec, said)
         if name in ("psi", "theta") and start.angle is None:
-            found[name] = _from_a_steady_course(found[name], start.time, said)
-    if "psi" in found and "r" not in found and not {"phi", "theta"} <= set(found):
+            smoothed[name] = _from_a_steady_course(smoothed[name], start.time, said)
+    if "psi" in smoothed and "r" not in smoothed and not {"phi", "theta"} <= set(smoothed):
         said.append("yaw rates are those of the heading: neither r nor heel and pitch are recorded or agree with it")
-    return found, said
+    return smoothed, said
 
 
 def _with_rate(
@@ -286,16 +286,16 @@ def _with_rate(
     at = record.abscissa
     values, slopes = {k: p(at) for k, p in alone.items()}, {k: p(at, 1) for k, p in alone.items()}
     angular = replace(record, value=angle_rate(name, record.value, values, slopes)) if inclined else record
-    found: dict[str, SmoothPath] = {}
+    smoothed: dict[str, SmoothPath] = {}
     joined = _joined(samples, angular, alone[name], stated_noise(spec, rate), 0.0 if inclined else _BODY_RATE)
     if joined is not None:
-        found[name] = joined
+        smoothed[name] = joined
         said.append(f"{one.headers[name]} and {one.headers[rate]} taken together: they agree")
     if not inclined and rate in ("r", "q") and len(record) >= 16:
         pair = regressed(at, record.value, slopes[name])
         if pair is not None and pair.agrees:
-            found[rate] = smooth([Samples(at, record.value, 0, stated_noise(spec, rate))])
-    return found
+            smoothed[rate] = smooth([Samples(at, record.value, 0, stated_noise(spec, rate))])
+    return smoothed
 
 
 def _from_run_up(record: Record, execute: float, noise: float) -> tuple[list[Samples], SmoothPath | None]:
@@ -335,11 +335,11 @@ def _joined(
     if len(inside) < 16:
         return None
     pair = regressed(inside.abscissa, inside.value, path(inside.abscissa, 1))
-    own = path_of(inside).sigma
-    offset_error = max(own, 1e-12) / math.sqrt(len(inside))
+    scatter = path_of(inside).sigma
+    offset_error = max(scatter, 1e-12) / math.sqrt(len(inside))
     if pair is None or abs(pair.slope - 1.0) > _CLOSE or abs(pair.offset) > 6.0 * offset_error + 1e-6:
         return None
     first = Samples(samples[0].time, samples[0].value, 0, samples[0].sigma or path.sigma)
     value = (inside.value - pair.offset) / pair.slope
-    sigma = math.hypot(noise or own, body_rate * float(np.sqrt(np.mean(value**2))))
+    sigma = math.hypot(noise or scatter, body_rate * float(np.sqrt(np.mean(value**2))))
     return smooth([first, Samples(inside.abscissa, value, 1, sigma)])

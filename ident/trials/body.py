@@ -73,9 +73,9 @@ def angle_rate(angle: str, rate: Array, values: Channels, rates: Channels) -> Ar
     phi, theta = values.get("phi", np.zeros(1)), values.get("theta", np.zeros(1))
     none = np.zeros(1)
     if angle == "psi":
-        found = (rates.get("theta", none) * np.tan(phi) + rate / np.cos(phi)) / np.cos(theta)
+        turning = (rates.get("theta", none) * np.tan(phi) + rate / np.cos(phi)) / np.cos(theta)
     elif angle == "theta":
-        found = (rate - rates.get("psi", none) * np.cos(theta) * np.sin(phi)) / np.cos(phi)
+        turning = (rate - rates.get("psi", none) * np.cos(theta) * np.sin(phi)) / np.cos(phi)
     else:
-        found = rate + rates.get("psi", none) * np.sin(theta)
-    return np.asarray(found)
+        turning = rate + rates.get("psi", none) * np.sin(theta)
+    return np.asarray(turning)

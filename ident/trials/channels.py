@@ -62,10 +62,10 @@ def unit_factor(channel: str, unit: str) -> float | None:
     """Factor from a unit to the SI unit of a channel; None when it is none of its units."""
     like = str(table().loc[channel, "like"])
     spelled = _SPELLED.get(unit.lower(), unit)
-    found = factor(like, spelled) if spelled else None
-    if found is None and unit.lower() not in _CAPITALS_COUNT:
-        found = factor(like, _SPELLED.get(unit.lower(), unit.lower())) if unit else None
-    return found
+    size = factor(like, spelled) if spelled else None
+    if size is None and unit.lower() not in _CAPITALS_COUNT:
+        size = factor(like, _SPELLED.get(unit.lower(), unit.lower())) if unit else None
+    return size
 
 
 def _split(header: str) -> tuple[str, str | None]:
@@ -79,10 +79,10 @@ def _split(header: str) -> tuple[str, str | None]:
     if channel_of(header):
         return header, _NAMED_UNIT.get(plain(header).split()[-1])
     for parts in (r"(.*\S)\s*[\s_/,]\s*(\S+)", r"([^_]+)_(\S+)"):
-        found = re.fullmatch(parts, header.strip())
-        channel = channel_of(found[1].rstrip(" _/,")) if found else ""
-        if found and channel and unit_factor(channel, found[2]) is not None:
-            return found[1].rstrip(" _/,"), found[2]
+        parted = re.fullmatch(parts, header.strip())
+        channel = channel_of(parted[1].rstrip(" _/,")) if parted else ""
+        if parted and channel and unit_factor(channel, parted[2]) is not None:
+            return parted[1].rstrip(" _/,"), parted[2]
     return header, None
 
 

@@ -52,13 +52,13 @@ def unit_slips() -> dict[str, float]:
     """Pairs of units that are taken for one another -> their ratio, above one; from ``data/unit_slips.csv``."""
     with (files("ident") / "data" / "unit_slips.csv").open(encoding="utf-8") as stream:
         rows = pd.read_csv(stream)
-    found = {}
+    ratios = {}
     for like, unit, instead, words in zip(rows["like"], rows["unit"], rows["instead"], rows["words"], strict=True):
         sizes = [factor(like, one) for one in (unit, instead)]
         assert sizes[0] is not None, words
         assert sizes[1] is not None, words
-        found[words] = sizes[0] / sizes[1]
-    return found
+        ratios[words] = sizes[0] / sizes[1]
+    return ratios
 
 
 def factor_between(ratio: float) -> tuple[float, str] | None:
@@ -99,7 +99,7 @@ def _inside(record: Record, time: Array) -> NDArray[np.bool_]:
 
 def _rates(one: Recording, slopes: dict[str, SmoothPath]) -> list[Finding]:
     """Rates against the angles they are rates of, and against those of others."""
-    found = []
+    findings = []
     for name in RATES:
         if name not in one.channels:
             continue
@@ -113,15 +113,15 @@ def _rates(one: Recording, slopes: dict[str, SmoothPath]) -> list[Finding]:
             pair = regressed(at, rate.value[inside], path(at, 1)) if inside.sum() >= 8 else None
             if pair:
                 pairs[angle] = pair
-        found += _of_rate(one, name, pairs)
-    return found
+        findings += _of_rate(one, name, pairs)
+    return findings
 
 
 def _of_rate(one: Recording, name: str, pairs: dict[str, Pair]) -> list[Finding]:
-    own = pairs.get(RATES[name])
+    of_its_angle = pairs.get(RATES[name])
     others = {a: p for a, p in pairs.items() if a != RATES[name] and abs(p.correlation) > 0.95}
     header = one.headers[name]
-    if others and (own is None or abs(own.correlation) < 0.8):
+    if others and (of_its_angle is None or abs(of_its_angle.correlation) < 0.8):
         angle, pair = max(others.items(), key=lambda item: abs(item[1].correlation))
         right = next(k for k, v in RATES.items() if v == angle)
         what = (
@@ -130,30 +130,40 @@ def _of_rate(one: Recording, name: str, pairs: dict[str, Pair]) -> list[Finding]
         )
         remedy = f'trial.toml: [channels] "{header}" = "{right} [UNIT]", or mend the file'
         return [finding_of(one, "exchanged_channels", (name, angle), pair.worst, what, remedy)]
-    if own is None or own.agrees:
+    if of_its_angle is None or of_its_angle.agrees:
         return []
     words = f"{header} against the rate of {one.headers[RATES[name]]}: "
-    words += f"slope {own.slope:.4g}, correlation {own.correlation:.3f}"
-    slip = factor_between(own.slope) if abs(own.correlation) > _ALIKE else None
+    words += f"slope {of_its_angle.slope:.4g}, correlation {of_its_angle.correlation:.3f}"
+    slip = factor_between(of_its_angle.slope) if abs(of_its_angle.correlation) > _ALIKE else None
     if slip:
         remedy = f'state the right unit in trial.toml: [channels] "{header}" = "{name} [UNIT]"'
         return [
             finding_of(
-                one, "unit_slip", (name, RATES[name]), own.worst, f"{words}: off by {slip[0]:.4g}, {slip[1]}", remedy
+                one,
+                "unit_slip",
+                (name, RATES[name]),
+                of_its_angle.worst,
+                f"{words}: off by {slip[0]:.4g}, {slip[1]}",
+                remedy,
             )
         ]
-    if own.correlation < -_ALIKE:
+    if of_its_angle.correlation < -_ALIKE:
         remedy = "state the frame of the record in trial.toml: [frame], or mend the sign of one of the two"
         return [
             finding_of(
-                one, "sign_of_a_rate", (name, RATES[name]), own.worst, f"{words}: they turn against one another", remedy
+                one,
+                "sign_of_a_rate",
+                (name, RATES[name]),
+                of_its_angle.worst,
+                f"{words}: they turn against one another",
+                remedy,
             )
         ]
-    if own.correlation < _ALIKE and abs(own.slope) < 2.0 and abs(own.slope) > 0.5:
+    if of_its_angle.correlation < _ALIKE and abs(of_its_angle.slope) < 2.0 and abs(of_its_angle.slope) > 0.5:
         # A noisy rate of the right size: nothing is wrong with it but the noise.
         return []
     remedy = "the rate is not used; look at its unit, its zero and its filter"
-    return [finding_of(one, "rate_against_angle", (name, RATES[name]), own.worst, words, remedy, "warning")]
+    return [finding_of(one, "rate_against_angle", (name, RATES[name]), of_its_angle.worst, words, remedy, "warning")]
 
 
 def _track(one: Recording) -> list[Finding]:
@@ -165,15 +175,15 @@ def _track(one: Recording) -> list[Finding]:
     t = north.abscissa
     speed = np.hypot(paths[0](t, 1), paths[1](t, 1))
     middle = speed[len(speed) // 20 : len(speed) - len(speed) // 20]
-    found = []
+    findings = []
     name = next((n for n in ("U", "u") if n in one.channels), None)
     if name and float(np.median(middle)) > 0.0:
         log = one.channels[name]
         ratio = float(np.median(speed / np.maximum(np.abs(log.at(t)), 1e-9)))
         worst = float(t[int(np.argmax(np.abs(speed - ratio * log.at(t))))])
-        found += _speed_ratio(one, name, ratio, worst)
+        findings += _speed_ratio(one, name, ratio, worst)
     if "psi" in one.channels:
-        found += _course(one, np.unwrap(np.arctan2(paths[1](t, 1), paths[0](t, 1))), t)
+        findings += _course(one, np.unwrap(np.arctan2(paths[1](t, 1), paths[0](t, 1))), t)
         away = drift(one.channels["psi"], north, east, [(0, 1.0), (1, 1.0)])
         if away is not None and away > _MOST_DRIFT:
             course = np.arctan2(paths[1](t, 1), paths[0](t, 1))
@@ -181,12 +191,12 @@ def _track(one: Recording) -> list[Finding]:
             what = f"track and heading differ by {math.degrees(away):.0f} deg (root mean square)"
             remedy = "state the axes in trial.toml, [axes] x = 'east', y = 'north', ..., or the frame; "
             remedy += "the two cannot both be right"
-            found.append(
+            findings.append(
                 finding_of(
                     one, "track_against_heading", ("north", "east", "psi"), float(t[int(np.argmax(gap))]), what, remedy
                 )
             )
-    return found
+    return findings
 
 
 def _course(one: Recording, course: Array, t: Array) -> list[Finding]:

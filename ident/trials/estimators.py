@@ -37,10 +37,10 @@ def _zigzag(one: Drawn, maneuver: Maneuver, start: Start, sense: int) -> Metrics
     name, word = ("psi", "yaw") if maneuver.kind == "zigzag" else ("theta", "pitch")
     rate = (yaw_rate if name == "psi" else pitch_rate)(one.values, one.rates)
     t, check = one.time - start.time, math.radians(maneuver.check or 0.0)
-    found = zigzag(t, one.angle(name), (t, rate), check, sense, word)
+    metrics = zigzag(t, one.angle(name), (t, rate), check, sense, word)
     if name == "theta" and "z" in one.values:
-        found["depth_overshoot_1_m"] = vertical.depth_overshoot(t, one.values["z"], found["execute_2_s"], sense)
-    return found
+        metrics["depth_overshoot_1_m"] = vertical.depth_overshoot(t, one.values["z"], metrics["execute_2_s"], sense)
+    return metrics
 
 
 def _turn(one: Drawn, start: Start) -> Metrics:
@@ -118,8 +118,8 @@ def _depth_change(one: Drawn, start: Start, step: float | None) -> Metrics:
     z = one.values["z"]
     order = step if step is not None else float(np.mean(z[-len(z) // 10 :]) - z[0])
     theta = one.values.get("theta", np.zeros_like(z))
-    found = vertical.depth_change({"t": one.time - start.time, "z": z, "theta": theta}, order)
-    return found if "theta" in one.values else {k: v for k, v in found.items() if k != "pitch_peak_deg"}
+    metrics = vertical.depth_change({"t": one.time - start.time, "z": z, "theta": theta}, order)
+    return metrics if "theta" in one.values else {k: v for k, v in metrics.items() if k != "pitch_peak_deg"}
 
 
 def _rise(one: Drawn, start: Start, point: tuple[float, float, float] | None) -> Metrics:
@@ -139,8 +139,8 @@ def _rise(one: Drawn, start: Start, point: tuple[float, float, float] | None) ->
             channels = {
                 k: np.append(v[:last], float(np.interp(place, np.arange(len(v)), v))) for k, v in channels.items()
             }
-    found = vertical.rise(channels, surfaced)
-    return {k: v for k, v in found.items() if u is not None or "speed" not in k}
+    metrics = vertical.rise(channels, surfaced)
+    return {k: v for k, v in metrics.items() if u is not None or "speed" not in k}
 
 
 _NEEDS = {

@@ -30,10 +30,10 @@ def exchanged(one: Recording) -> list[Finding]:
     one : In program axes.
     """
     path = cache(lambda name: path_of(one.channels[name]))
-    found: dict[frozenset[str], Finding] = {}
+    of_columns: dict[frozenset[str], Finding] = {}
     for finding in (*_along_the_track(one, path), *_rates(one, path)):
-        found.setdefault(frozenset(finding.columns), finding)
-    return list(found.values())
+        of_columns.setdefault(frozenset(finding.columns), finding)
+    return list(of_columns.values())
 
 
 def _others(one: Recording, *but: str) -> list[str]:

@@ -89,7 +89,7 @@ def keeping(one: Drawn, start: Start, steering: Steering | None) -> Metrics:
     heading's from the course before the execute where that is known. With a push the metrics of
     ``ident.metrics.vertical.course_keeping``.
     """
-    found: Metrics = {}
+    metrics: Metrics = {}
     for name, word, factor, unit in (
         ("psi", "heading", _DEGREES, "deg"),
         ("theta", "pitch", _DEGREES, "deg"),
@@ -98,11 +98,11 @@ def keeping(one: Drawn, start: Start, steering: Steering | None) -> Metrics:
     ):
         if name in one.values:
             values = factor * one.values[name]
-            found[f"{word}_rms_{unit}"] = float(np.std(values))
+            metrics[f"{word}_rms_{unit}"] = float(np.std(values))
             middle = factor * one.base if name == "psi" and one.base is not None else values.mean()
-            found[f"{word}_deviation_peak_{unit}"] = float(np.max(np.abs(values - middle)))
+            metrics[f"{word}_deviation_peak_{unit}"] = float(np.max(np.abs(values - middle)))
     if steering is None or "psi" not in one.values:
-        return found
+        return metrics
     channels = one.horizontal(start.time)
     channels["psi"] = channels["psi"].copy()
     channels["psi"][0] = 0.0
@@ -112,7 +112,7 @@ def keeping(one: Drawn, start: Start, steering: Steering | None) -> Metrics:
     back.pop("rudder_rms_deg")
     if "north" not in one.values:
         back.pop("lateral_offset_m")
-    return found | back
+    return metrics | back
 
 
 def rudder_used(steering: Steering) -> tuple[float, float] | None:

@@ -230,7 +230,7 @@ def _by_angle(one: Recording, name: str) -> tuple[Maneuver, str] | None:
     return Maneuver(kind, None, check), text + f' deg. State it if it is another: --maneuver "{kind} D/C"'
 
 
-def _rudder_fits(one: Recording, angle: str, found: Maneuver) -> None:
+def _rudder_fits(one: Recording, angle: str, maneuver: Maneuver) -> None:
     """Refuse a zigzag that the heading shows, and a recorded rudder that does not go to and fro in steps.
 
     Raises
@@ -239,7 +239,7 @@ def _rudder_fits(one: Recording, angle: str, found: Maneuver) -> None:
         Naming the column of the rudder.
     """
     control = control_of(one, angle == "theta")
-    if control is None or found.check is None or float(np.ptp(control.value)) < math.radians(1.0):
+    if control is None or maneuver.check is None or float(np.ptp(control.value)) < math.radians(1.0):
         return
     header, turning = one.headers[control.channel], one.headers[angle]
     what = f"{turning} makes a zigzag, and {header} holds no steps to and fro by one angle: channels exchanged?"

@@ -80,13 +80,13 @@ def _draws(
     moved = start.time_sigma * rng.standard_normal(count)
     base = None if start.angle is None else start.angle + start.angle_sigma * rng.standard_normal(count)
     drawn = {name: path.drawn(count, rng) for name, path in paths.items()}
-    found = []
+    draws = []
     for i in range(count):
         one = {name: d[i] for name, d in drawn.items()}
         at = np.clip(grid + moved[i], *_range(one)) if moved[i] else grid
         values, rates = {k: p(at) for k, p in one.items()}, {k: p(at, 1) for k, p in one.items()}
-        found.append(Drawn(at - moved[i], values, rates, None if base is None else float(base[i]), origin))
-    return found
+        draws.append(Drawn(at - moved[i], values, rates, None if base is None else float(base[i]), origin))
+    return draws
 
 
 def _repeated(
@@ -109,12 +109,12 @@ def _range(paths: dict[str, SmoothPath]) -> tuple[float, float]:
 
 def _measured_on(measure: Callable[[Drawn], Metrics], several: list[Drawn], names: Metrics) -> dict[str, list[float]]:
     """Values of each metric on some draws, as far as they have it."""
-    found: dict[str, list[float]] = {name: [] for name in names}
+    samples: dict[str, list[float]] = {name: [] for name in names}
     for one in several:
         for name, value in measure(one).items():
-            if name in found and value is not None:
-                found[name].append(value)
-    return found
+            if name in samples and value is not None:
+                samples[name].append(value)
+    return samples
 
 
 def with_errors(
@@ -132,7 +132,7 @@ def with_errors(
     """
     best, twice = measure(likely), measure(again)
     spread, noisy = _measured_on(measure, draws, best), _measured_on(measure, repeated, best)
-    found = {}
+    metrics = {}
     for name, value in best.items():
         drawn = np.array(spread[name])
         if value is None or drawn.size < 0.9 * len(draws):
@@ -145,8 +145,8 @@ def with_errors(
         if abs(high) > size:
             high, size = 0.0, math.sqrt(float(np.mean((drawn - value) ** 2)))
         sigma = math.sqrt(size**2 + bias**2 + _LEAST.get(unit, 1e-6) ** 2)
-        found[name] = Value(float(value) - high, sigma, unit)
-    return found
+        metrics[name] = Value(float(value) - high, sigma, unit)
+    return metrics
 
 
 def measured(
@@ -172,12 +172,12 @@ def measured(
     measure = estimator(one, maneuver, start, spec, likely)
     again = _most_likely({k: p.again() for k, p in paths.items()}, grid, start, origin)
     repeated = _repeated(paths, grid, start, origin, max(4, count // 4))
-    found = with_errors(measure, likely, again, _draws(paths, grid, start, origin, count, 0), repeated)
-    if maneuver.kind == "stopping" and "heading_change_deg" in found:
-        found["heading_change_deg"] = _run_out(found["heading_change_deg"], likely)
+    metrics = with_errors(measure, likely, again, _draws(paths, grid, start, origin, count, 0), repeated)
+    if maneuver.kind == "stopping" and "heading_change_deg" in metrics:
+        metrics["heading_change_deg"] = _run_out(metrics["heading_change_deg"], likely)
     if maneuver.kind == "course_keeping":
-        found = _after_a_push(found, steering_of(one, start, spec))
-    return found | _approach_speed(one, paths, start)
+        metrics = _after_a_push(metrics, steering_of(one, start, spec))
+    return metrics | _approach_speed(one, paths, start)
 
 
 def _run_out(change: Value, likely: Drawn) -> Value:
@@ -189,17 +189,17 @@ def _run_out(change: Value, likely: Drawn) -> Value:
     return Value(change.value, math.hypot(change.sigma, abs(math.degrees(turned)) / math.sqrt(12.0)), change.unit)
 
 
-def _after_a_push(found: dict[str, Value], steering: Steering | None) -> dict[str, Value]:
+def _after_a_push(metrics: dict[str, Value], steering: Steering | None) -> dict[str, Value]:
     """Metrics of course keeping with the error of when the autopilot took over, and the rudder it used."""
     if steering is None:
-        return found
-    if "settling_s" in found:
-        one = found["settling_s"]
-        found["settling_s"] = Value(one.value, math.hypot(one.sigma, steering.sigma), one.unit)
+        return metrics
+    if "settling_s" in metrics:
+        one = metrics["settling_s"]
+        metrics["settling_s"] = Value(one.value, math.hypot(one.sigma, steering.sigma), one.unit)
     used = rudder_used(steering)
     if used is not None:
-        found["rudder_rms_deg"] = Value(used[0], math.hypot(used[1], _LEAST["deg"]), "deg")
-    return found
+        metrics["rudder_rms_deg"] = Value(used[0], math.hypot(used[1], _LEAST["deg"]), "deg")
+    return metrics
 
 
 def _approach_speed(one: Recording, paths: dict[str, SmoothPath], start: Start) -> dict[str, Value]:

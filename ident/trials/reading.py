@@ -173,35 +173,35 @@ def _meanings(sheet: Sheet, header: list[str], spec: TrialFile, said: list[str])
     for key in spec.channels:
         if key not in header and key not in [h.partition(" [")[0] for h in header]:
             raise InputError(f"{sheet.path}, key channels", f"no column {key!r}", ", ".join(header)[:200])
-    found = [meaning(h, spec.channels.get(h, spec.channels.get(h.partition(" [")[0])), sheet.where) for h in header]
-    if sum(f is not None and f.channel == "z" for f in found) > 1:
+    meanings = [meaning(h, spec.channels.get(h, spec.channels.get(h.partition(" [")[0])), sheet.where) for h in header]
+    if sum(f is not None and f.channel == "z" for f in meanings) > 1:
         # A depth of the sail top beside that of the boat, as ``ident fly`` writes: one depth is enough.
-        for i, f in enumerate(found):
+        for i, f in enumerate(meanings):
             if f is not None and f.channel == "z" and plain(f.header).startswith("d0"):
                 said.append(f"{f.header}: not used, z is the depth")
-                found[i] = None
-    for one in (f for f in found if f is not None):
-        twice = [f.header for f in found if f is not None and f.channel == one.channel]
+                meanings[i] = None
+    for one in (f for f in meanings if f is not None):
+        twice = [f.header for f in meanings if f is not None and f.channel == one.channel]
         if len(twice) > 1:
             text = f'one column a channel; leave one out in trial.toml: [channels] "{twice[1]}" = "-"'
             raise InputError(sheet.where, f"{' and '.join(map(repr, twice))} both hold {one.channel}", text)
         if one.assumed:
             said.append(one.assumed)
-    unused = [h for h, f in zip(header, found, strict=True) if f is None and h not in sheet.spacers]
+    unused = [h for h, f in zip(header, meanings, strict=True) if f is None and h not in sheet.spacers]
     if unused:
         said.append(f"columns not used: {', '.join(unused)[:200]}")
-    return found
+    return meanings
 
 
 def _wide(
     sheet: Sheet, header: list[str], rows: list[int], cells: list[list[str]], spec: TrialFile, said: list[str]
 ) -> Recording:
-    found = _meanings(sheet, header, spec, said)
-    clock = next((i for i, f in enumerate(found) if f is not None and f.channel == "t"), None)
+    columns = _meanings(sheet, header, spec, said)
+    clock = next((i for i, f in enumerate(columns) if f is not None and f.channel == "t"), None)
     if clock is None:
         text = 'a column of time (t [s], time, UTC), or trial.toml: [channels] "NAME" = "t [s]"'
         raise InputError(sheet.where, f"no time among {', '.join(header)[:160]}", text)
-    one = found[clock]
+    one = columns[clock]
     assert one is not None
     raw = [parsed(c[clock], sheet.dialect.number(c[clock])) for c in cells]
     bad = next((i for i, v in enumerate(raw) if v is None or not math.isfinite(v)), None)
@@ -222,7 +222,7 @@ def _wide(
     said += times.said
     zero = 0.0 if as_clock else float(raw[0] or 0.0) * one.factor
     channels, headers = {}, {"t": one.header}
-    for i, what in enumerate(found):
+    for i, what in enumerate(columns):
         if what is None or i == clock:
             continue
         value = _numbers(sheet, rows, cells, i, what)
@@ -239,12 +239,12 @@ def _wide(
 
 def _position(cell: str) -> float | None:
     """Degrees of ``43°06.135'N`` or ``43 06 08.1 N``, negative to the south and west."""
-    found = _DEGREES.fullmatch(cell.strip().replace(",", "."))
-    if not found:
+    coordinate = _DEGREES.fullmatch(cell.strip().replace(",", "."))
+    if not coordinate:
         return None
-    minutes, seconds = float(found[2] or 0.0), float(found[3] or 0.0)
-    size = float(found[1]) + minutes / 60.0 + seconds / 3600.0
-    return -size if found[4].upper() in "SW" else size
+    minutes, seconds = float(coordinate[2] or 0.0), float(coordinate[3] or 0.0)
+    size = float(coordinate[1]) + minutes / 60.0 + seconds / 3600.0
+    return -size if coordinate[4].upper() in "SW" else size
 
 
 def _numbers(sheet: Sheet, rows: list[int], cells: list[list[str]], column: int, what: Meaning) -> Array:
@@ -286,8 +286,8 @@ def _long(
         unit = cells[mine[0]][at["unit"]]
         other = next((i for i in mine if cells[i][at["unit"]].strip() != unit.strip()), None)
         if other is not None:
-            where, found = f"{sheet.path}, row {rows[other]}, column unit", repr(cells[other][at["unit"]][:40])
-            raise InputError(where, found, f"{unit!r}, as in row {rows[mine[0]]}: one unit a channel")
+            where, shown = f"{sheet.path}, row {rows[other]}, column unit", repr(cells[other][at["unit"]][:40])
+            raise InputError(where, shown, f"{unit!r}, as in row {rows[mine[0]]}: one unit a channel")
         what = meaning(f"{name} [{unit}]", spec.channels.get(name), f"{sheet.path}, row {rows[mine[0]]}")
         if what is None:
             said.append(f"channel not used: {name}")

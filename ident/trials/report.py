@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ident.text import on_screen
-from ident.trials.criteria import criteria
+from ident.trials.criteria import Criterion, criteria
 from ident.trials.measure import Value
 from ident.trials.spec import TrialFile, load_spec
 from ident.trials.stated import quoted
@@ -46,12 +46,12 @@ class Trials:
             return one.to_dict() | {"criteria": [c.to_dict() for c in _criteria(one)]}
         return {
             "trials": [t.to_dict() | {"criteria": [c.to_dict() for c in _criteria(t)]} for t in self.trials],
-            "scatter": scatter(self.trials),
+            "scatter": [s.to_dict() for s in scatter(self.trials)],
             "refused": [{"file": f, "what": what} for f, what in self.refused],
         }
 
 
-def _criteria(one: Trial) -> list[Any]:
+def _criteria(one: Trial) -> list[Criterion]:
     return criteria(one.maneuver, one.metrics, one.spec.length_m)
 
 
@@ -88,36 +88,62 @@ def measure_all(path: Path, spec: TrialFile) -> Trials:
     return Trials(tuple(trials), tuple(refused), True)
 
 
-def scatter(trials: tuple[Trial, ...]) -> list[dict[str, Any]]:
-    """Mean and scatter of each metric over the runs of one maneuver to one side, beside their stated errors.
+@dataclass(frozen=True)
+class Scatter:
+    """One metric over the runs of one maneuver to one side.
 
-    Returns
-    -------
-    Rows of maneuver, side, metric, runs, mean, scatter (standard deviation of a run), stated (root mean
-    square of the standard errors), unit; and ``port_less_starboard`` with its standard error where both
-    sides were run.
+    Attributes
+    ----------
+    maneuver, side, metric, unit : Which.
+    runs : How many.
+    mean : Of the runs.
+    scatter : Standard deviation of a run; None for one run.
+    stated : Root mean square of the runs' standard errors.
+    port_less_starboard : Difference of the sides' means, where both were run: with the port side's rows.
     """
+
+    maneuver: str
+    side: str
+    metric: str
+    runs: int
+    mean: float
+    scatter: float | None
+    stated: float
+    unit: str
+    port_less_starboard: Value | None = None
+
+    def to_dict(self) -> dict[str, Any]:
+        """For a machine to read; ``port_less_starboard`` where both sides were run."""
+        row = {f.name: getattr(self, f.name) for f in fields(self) if f.name != "port_less_starboard"}
+        gap = self.port_less_starboard
+        return row if gap is None else row | {"port_less_starboard": {"value": gap.value, "sigma": gap.sigma}}
+
+
+def scatter(trials: tuple[Trial, ...]) -> list[Scatter]:
+    """Mean and scatter of each metric over the runs of one maneuver to one side, beside their stated errors."""
     groups: dict[tuple[str, str], dict[str, list[Value]]] = {}
     for one in trials:
         group = groups.setdefault((str(one.maneuver), side_of(one)), {})
         for name, value in one.metrics.items():
             group.setdefault(name, []).append(value)
-    rows: list[dict[str, Any]] = []
+    rows = []
     for (maneuver, side), metrics in groups.items():
         for name, values in metrics.items():
             x = np.array([v.value for v in values])
             stated = float(np.sqrt(np.mean([v.sigma**2 for v in values])))
-            row: dict[str, Any] = {"maneuver": maneuver, "side": side, "metric": name, "runs": len(x)}
-            row |= {"mean": float(x.mean()), "scatter": float(x.std(ddof=1)) if len(x) > 1 else None}
-            row |= {"stated": stated, "unit": values[0].unit}
-            other = groups.get((maneuver, "starboard" if side == "port" else "port"), {}).get(name)
-            if side == "port" and other:
-                y = np.array([v.value for v in other])
-                spread = [float(a.var(ddof=1)) if len(a) > 1 else stated**2 for a in (x, y)]
-                error = math.sqrt(max(spread[0], stated**2) / len(x) + max(spread[1], stated**2) / len(y))
-                row["port_less_starboard"] = {"value": float(x.mean() - y.mean()), "sigma": error}
-            rows.append(row)
+            spread = float(x.std(ddof=1)) if len(x) > 1 else None
+            other = groups.get((maneuver, "starboard"), {}).get(name) if side == "port" else None
+            gap = _port_less_starboard(values, other, stated) if other else None
+            rows.append(Scatter(maneuver, side, name, len(x), float(x.mean()), spread, stated, values[0].unit, gap))
     return rows
+
+
+def _port_less_starboard(port: list[Value], starboard: list[Value], stated: float) -> Value:
+    """Difference of the means, its error by the scatter of the runs and at least that which is stated."""
+    x, y = (np.array([v.value for v in side]) for side in (port, starboard))
+    spread = [float(a.var(ddof=1)) if len(a) > 1 else stated**2 for a in (x, y)]
+    error = math.sqrt(max(spread[0], stated**2) / len(x) + max(spread[1], stated**2) / len(y))
+    return Value(float(x.mean() - y.mean()), error, port[0].unit)
 
 
 def write_csv(done: Trials, path: Path) -> None:
@@ -181,22 +207,13 @@ def _show_one(one: Trial, console: Console) -> None:
 def _show_scatter(done: Trials, console: Console) -> None:
     from rich.table import Table
 
-    rows = [r for r in scatter(done.trials) if r["runs"] > 1 or "port_less_starboard" in r]
+    rows = [r for r in scatter(done.trials) if r.runs > 1 or r.port_less_starboard is not None]
     if not rows:
         return
     table = Table("maneuver", "side", "metric", "runs", "mean", "scatter", "stated", "port - starboard", title="Runs")
     for r in rows:
-        gap = r.get("port_less_starboard")
-        shown = "" if gap is None else " +- ".join(rounded(gap["value"], gap["sigma"]))
-        spread = "-" if r["scatter"] is None else f"{r['scatter']:.3g}"
-        table.add_row(
-            r["maneuver"],
-            r["side"],
-            r["metric"],
-            str(r["runs"]),
-            f"{r['mean']:.5g}",
-            spread,
-            f"{r['stated']:.2g}",
-            shown,
-        )
+        gap = r.port_less_starboard
+        shown = "" if gap is None else " +- ".join(rounded(gap.value, gap.sigma))
+        spread = "-" if r.scatter is None else f"{r.scatter:.3g}"
+        table.add_row(r.maneuver, r.side, r.metric, str(r.runs), f"{r.mean:.5g}", spread, f"{r.stated:.2g}", shown)
     console.print(table)

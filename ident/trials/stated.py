@@ -39,23 +39,23 @@ def unused(as_read: Recording, one: Recording, maneuver: Maneuver, spec: TrialFi
     as_read, one : The recording with the file's own channels, and in program axes.
     maneuver, spec : What was done, and what is stated.
     """
-    found = []
+    idle = []
     for key, channels in _NOISE.items():
         if getattr(spec.noise, key) is not None and not set(channels) & set(one.channels):
-            found.append((f"noise.{key}", "the record has no such channel", "the noise of a channel that is recorded"))
+            idle.append((f"noise.{key}", "the record has no such channel", "the noise of a channel that is recorded"))
     for key, kinds in _OF_KIND.items():
         value = getattr(spec.initial, key[8:]) if key.startswith("initial.") else getattr(spec, key)
         if value is not None and maneuver.kind not in kinds:
-            found.append((key, f"a {maneuver.kind} is not measured by it", f"the key with {' or '.join(kinds)}"))
+            idle.append((key, f"a {maneuver.kind} is not measured by it", f"the key with {' or '.join(kinds)}"))
     if spec.initial.heading_deg is not None and ("psi" not in one.channels or not maneuver.horizontal):
-        found.append(("initial.heading_deg", f"no heading that {maneuver.kind} counts from", "a heading, or no key"))
+        idle.append(("initial.heading_deg", f"no heading that {maneuver.kind} counts from", "a heading, or no key"))
     if spec.axes is not None and not {"x", "y"} <= set(as_read.channels):
-        found.append(("axes", "the record has no x and y", "columns x and y, or no [axes]"))
+        idle.append(("axes", "the record has no x and y", "columns x and y, or no [axes]"))
     if spec.wrap_deg is not None and not {"psi", "course"} & set(one.channels):
-        found.append(("wrap_deg", "the record has no heading", "a heading, or no key"))
+        idle.append(("wrap_deg", "the record has no heading", "a heading, or no key"))
     if spec.current is not None and "north" not in one.channels:
-        found.append(("current", "the record has no track", "a track, or no [current]"))
-    return found
+        idle.append(("current", "the record has no track", "a track, or no [current]"))
+    return idle
 
 
 def refuse_unused(file: str, keys: list[tuple[str, str, str]]) -> None:

@@ -108,13 +108,13 @@ def _swings(trial: Trial) -> None:
 
 
 def _taken_for_granted(
-    one: Recording, maneuver: Maneuver, start: Start, found: dict[str, SmoothPath], spec: TrialFile
+    one: Recording, maneuver: Maneuver, start: Start, smoothed: dict[str, SmoothPath], spec: TrialFile
 ) -> list[str]:
     """What the estimator of a maneuver takes for granted."""
     if maneuver.kind == "course_keeping":
         steering = steering_of(one, start, spec)
         return [steering.said if steering else "no push by the rudder at the execute: deviations only"]
-    if maneuver.kind == "depth_change" and "z" in found:
+    if maneuver.kind == "depth_change" and "z" in smoothed:
         stated = spec.step_m is not None
         order = (
             f"{spec.step_m:g} m: stated" if stated else "what the last tenth of the record comes to; step_m states it"
@@ -170,14 +170,14 @@ def measure_trial(path: Path, spec: TrialFile | None = None, count: int = DRAWS,
     try:
         one = with_white_noise(one)
         start = start_of(one, maneuver, spec)
-        found, taken = paths(one, start, spec)
-        metrics = measured(one, maneuver, start, found, spec, count)
+        smoothed, taken = paths(one, start, spec)
+        metrics = measured(one, maneuver, start, smoothed, spec, count)
     except np.linalg.LinAlgError as error:
         named = f"no smooth path through {', '.join(one.headers.values())[:160]}: {error}"
         remedy = "a record whose samples are even in time and of a size: look at the clock and the units"
         raise InputError(str(path), named, remedy) from error
     by_key = [f"key {key}: changes nothing here, {why}" for key, why, _ in idle]
-    said = (*one.assumed, *by_key, by, *start.said, *taken, *_taken_for_granted(one, maneuver, start, found, spec))
-    done = Trial(one, spec, maneuver, start, found, metrics, said, tuple(findings))
+    said = (*one.assumed, *by_key, by, *start.said, *taken, *_taken_for_granted(one, maneuver, start, smoothed, spec))
+    done = Trial(one, spec, maneuver, start, smoothed, metrics, said, tuple(findings))
     _swings(done)
     return done
