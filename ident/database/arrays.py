@@ -55,13 +55,13 @@ def _source(row: dict[Hashable, Any], known: dict[str, Any], commit: Version) ->
         return "zero by port/starboard symmetry" if row["origin"] == "symmetry" else str(row["origin"])
     if not known:
         return f"campaign {commit.metadata.get('campaign', '')}"
-    found: dict[tuple[int, int], list[int]] = {}
+    places_of: dict[tuple[int, int], list[int]] = {}
     for run in row["runs"].split():
         file, place, source = known["runs"].get(run, (-1, 0, -1))
         if file >= 0:
-            found.setdefault((source, file), []).append(place)
+            places_of.setdefault((source, file), []).append(place)
     texts = []
-    for (source, file), places in found.items():
+    for (source, file), places in places_of.items():
         where = f"{known['files'][file]} row {' '.join(str(p) for p in sorted(places))}"
         texts.append(f"{known['sources'][source]} ({where})" if known["sources"][source] else where)
     mirrored = "mirror image of: " if row["origin"] == "mirror" else ""
@@ -107,9 +107,9 @@ def coefficient_array(rows: pd.DataFrame, name: str, commits: dict[str, Version]
     coordinates: dict[str, Any] = {a: (a, labels[a], {} if a in _WHOSE else _axis_attributes(a)) for a in axes}
     coordinates |= {k: (axes, grid(beside[k].to_numpy(), blank)) for k, blank in _BESIDE.items()}
     coordinates |= {k: rows[k].iloc[0] for k in _WHOSE if k not in axes}
-    found = xr.DataArray(grid(rows["value"].to_numpy(), np.nan), coordinates, axes, name, _attributes(rows, name))
-    found["stderr"].attrs = {"units": "1", "long_name": "standard error of the value"}
-    return found
+    array = xr.DataArray(grid(rows["value"].to_numpy(), np.nan), coordinates, axes, name, _attributes(rows, name))
+    array["stderr"].attrs = {"units": "1", "long_name": "standard error of the value"}
+    return array
 
 
 def _axis_attributes(column: str) -> dict[str, str]:

@@ -103,7 +103,7 @@ def compared(first: pd.DataFrame, second: pd.DataFrame) -> list[Change]:
     """What changed from database rows to others, one entry a coefficient that differs."""
     old, new = _indexed(first), _indexed(second)
     both = old.add_suffix("_old").join(new.add_suffix("_new"), how="outer")
-    found = []
+    changes = []
     for (vehicle, name), group in both.groupby(level=["vehicle", "coefficient"], sort=False):
         added, removed = group["value_old"].isna(), group["value_new"].isna()
         step = (group["value_new"] - group["value_old"]).abs()
@@ -113,7 +113,7 @@ def compared(first: pd.DataFrame, second: pd.DataFrame) -> list[Change]:
         error = group[["stderr_old", "stderr_new"]].max(axis=1)
         score = (step / error)[changed & (error > 0)]
         scale = group["value_old"].abs().max()
-        found.append(
+        changes.append(
             Change(
                 vehicle=str(vehicle),
                 coefficient=str(name),
@@ -124,7 +124,7 @@ def compared(first: pd.DataFrame, second: pd.DataFrame) -> list[Change]:
                 largest_change_in_stderr=float(score.max()) if not score.empty else 0.0,
             )
         )
-    return found
+    return changes
 
 
 def export(db: str, version: int | None, kind: str, folder: Path) -> dict[str, Any]:
@@ -158,7 +158,7 @@ def export(db: str, version: int | None, kind: str, folder: Path) -> dict[str, A
             rows.to_json(part, orient="records", indent=1, double_precision=15)
     history = versions(db)
     commit = next(v for v in history if v.number == number)
-    own = {name: last_own(history, name, number) or commit for name in rows["vehicle"].unique()}
+    last_commit = {name: last_own(history, name, number) or commit for name in rows["vehicle"].unique()}
     return {
         "file": str(path),
         "format": kind,
@@ -166,6 +166,6 @@ def export(db: str, version: int | None, kind: str, folder: Path) -> dict[str, A
         "rows": len(rows),
         "vehicles": [
             {"vehicle": name, "version": v.number, "digest": v.digest, "rows": int(rows["vehicle"].eq(name).sum())}
-            for name, v in own.items()
+            for name, v in last_commit.items()
         ],
     }

@@ -118,16 +118,16 @@ def examine(
 
 
 def _faults(log: Log, each: Callable[[str], None]) -> dict[int, str]:
-    found = {}
+    faults = {}
     for number in range(log.first, log.last + 1):
         each(f"version {number} of {log.last}")
         try:
             log.entry(number)
             check_digests(log, number, stored_rows(log, number))
-            found[number] = ""
+            faults[number] = ""
         except InputError as error:
-            found[number] = error.found
-    return found
+            faults[number] = error.found
+    return faults
 
 
 def _entry(log: Log, number: int) -> Version | None:
@@ -152,7 +152,7 @@ def _wanted(log: Log, number: int) -> dict[str, str]:
 
 def _sources(log: Log, faults: dict[int, str], folders: tuple[Path, ...], completed: Completed | None) -> Rows:
     """(Vehicle, digest) -> where rows of that digest are, and the rows."""
-    found: Rows = {}
+    sources: Rows = {}
     for number in faults:
         wanted = _wanted(log, number)
         try:
@@ -162,8 +162,8 @@ def _sources(log: Log, faults: dict[int, str], folders: tuple[Path, ...], comple
         # One vehicle's rows may be damaged and another's not.
         for vehicle, content in wanted.items():
             rows = everything[everything["vehicle"] == vehicle]
-            if (vehicle, content) not in found and matches(log, number, rows, content):
-                found[vehicle, content] = (f"version {number}", rows)
+            if (vehicle, content) not in sources and matches(log, number, rows, content):
+                sources[vehicle, content] = (f"version {number}", rows)
     commits = [v for n in faults if (v := _entry(log, n)) is not None and v.digest]
     for folder in folders:
         places = find_campaigns(folder)
@@ -175,8 +175,8 @@ def _sources(log: Log, faults: dict[int, str], folders: tuple[Path, ...], comple
                 continue
             rows = database_rows(identify(campaign))
             for one in [rows, *([completed(campaign, rows)] if completed else [])]:
-                found.setdefault((campaign.vehicle.name, digest(one)), (f"campaign {where}", one))
-    return found
+                sources.setdefault((campaign.vehicle.name, digest(one)), (f"campaign {where}", one))
+    return sources
 
 
 def repair(
@@ -321,8 +321,8 @@ def _latest_again(path: str, log: Log, fault: str, sources: Rows) -> list[str]:
     if not wanted or any(item not in sources for item in wanted.items()):
         return []
     everything = pd.concat([sources[item][1] for item in wanted.items()], ignore_index=True)
-    own = [v for v in log.versions if v.digest and v.metadata.get("vehicle", "") in wanted]
-    bad = log.entry(log.last).version if log.entry(log.last).version.digest else own[-1]
+    of_vehicles = [v for v in log.versions if v.digest and v.metadata.get("vehicle", "") in wanted]
+    bad = log.entry(log.last).version if log.entry(log.last).version.digest else of_vehicles[-1]
     message = f"repairs version {log.last}: {fault}"
     said = bad.metadata | {"message": message, "repairs": str(log.last)}
     number = commit_again(path, everything, bad.metadata["vehicle"], said, log.last)

@@ -41,12 +41,12 @@ def installation() -> dict[str, Any]:
     ``threads`` (cores, and what limits them), ``cache`` (folder of compiled functions and its
     size in bytes).
     """
-    found = {}
+    packages = {}
     for name in _PACKAGES:
         try:
-            found[name] = metadata.version(name)
+            packages[name] = metadata.version(name)
         except metadata.PackageNotFoundError:
-            found[name] = ""
+            packages[name] = ""
     import sim  # noqa: F401  chooses the folder
 
     cache = os.environ.get("NUMBA_CACHE_DIR", "")
@@ -55,7 +55,7 @@ def installation() -> dict[str, Any]:
         "program": f"ident {__version__}",
         "python": sys.version.split()[0],
         "machine": f"{platform.system()} {platform.machine()}",
-        "packages": found,
+        "packages": packages,
         "threads": {"cores": os.cpu_count() or 1} | {k: os.environ[k] for k in _THREADS if k in os.environ},
         "cache": {"folder": cache, "bytes": size},
     }
@@ -68,15 +68,15 @@ def self_test() -> list[dict[str, str]]:
     -------
     One entry a test: ``test`` and ``fault``, empty when it passed.
     """
-    found = []
+    results = []
     for name, test in (("bundled vehicles", _vehicles), ("a database, written and read back", _database)):
         try:
             test()
-            found.append({"test": name, "fault": ""})
+            results.append({"test": name, "fault": ""})
         except Exception as error:
             # Whatever goes wrong is what this is for.
-            found.append({"test": name, "fault": f"{type(error).__name__}: {error}"})
-    return found
+            results.append({"test": name, "fault": f"{type(error).__name__}: {error}"})
+    return results
 
 
 def _vehicles() -> None:

@@ -72,11 +72,11 @@ def _empty_entry(storage: Storage, log_files: Mapping[str, int]) -> str:
 
 def remove_unfinished(path: str) -> dict[str, int]:
     """Remove what ``unfinished`` names, and return it; raises as it does."""
-    found = unfinished(path)
+    leftovers = unfinished(path)
     storage = Storage(path)
-    for name in found:
+    for name in leftovers:
         storage.remove(name)
-    return found
+    return leftovers
 
 
 def vacuum(path: str, wait: float = WAIT, dry_run: bool = False) -> dict[str, int]:

@@ -188,11 +188,11 @@ def _reduction(sources: list[dict[str, Any]], histories: list[dict[str, str]]) -
         if one["reduction"]:
             settings = {k: v for k, v in one["reduction"].items() if v not in (None, 0.0)}
             texts.append(f"{one['files']}: " + ", ".join(f"{k} {v}" for k, v in settings.items()))
-    found = [("Reduction", "; ".join(texts))] if texts else []
+    rows = [("Reduction", "; ".join(texts))] if texts else []
     if histories:
         method = f"start-up transient {TRANSIENT}, standard error {ERROR}"
-        found.append(("Histories reduced", f"{len(histories)}; {method}"))
-    return found + [(one["run_id"], one["reduction"]) for one in histories]
+        rows.append(("Histories reduced", f"{len(histories)}; {method}"))
+    return rows + [(one["run_id"], one["reduction"]) for one in histories]
 
 
 def _tare(tares: list[dict[str, Any]]) -> str:
@@ -242,12 +242,12 @@ def _half(half: dict[str, Any] | None) -> str:
     return f"{half['plane']}: loads doubled ({half['source']})" if half else "no: the whole body was tested"
 
 
-def _hydrostatics(own: dict[str, Any] | None) -> list[tuple[str, str]]:
-    if not own:
+def _hydrostatics(load: dict[str, Any] | None) -> list[tuple[str, str]]:
+    if not load:
         return []
-    centre = ", ".join(f"{x:g}" for x in own["centre_m"])
-    text = f"{own['force_n']:g} N upwards at ({centre}) m taken off {' '.join(own['parts'])}, body {own['attitude']}"
-    return [("Hydrostatic load", f"{text}; {own['source']}")]
+    centre = ", ".join(f"{x:g}" for x in load["centre_m"])
+    text = f"{load['force_n']:g} N upwards at ({centre}) m taken off {' '.join(load['parts'])}, body {load['attitude']}"
+    return [("Hydrostatic load", f"{text}; {load['source']}")]
 
 
 def _scale(scale: dict[str, Any], fluid: dict[str, Any]) -> str:
