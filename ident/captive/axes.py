@@ -63,14 +63,14 @@ def to_body(runs: pd.DataFrame, chosen: pd.Series, flow: pd.Series) -> pd.DataFr
     for group in GROUPS:
         values = runs.loc[rows, list(group)].to_numpy(float)
         whole = np.zeros_like(values)
-        for i, own in enumerate(group):
+        for i, load in enumerate(group):
             for j, other in enumerate(group):
                 share = np.where(np.abs(matrix[:, i, j]) > _NOTHING, matrix[:, i, j], 0.0)
                 lost = (share != 0.0) & np.isnan(values[:, j]) & ~np.isnan(values[:, i])
                 if lost.any():
                     run = runs.loc[rows[int(np.flatnonzero(lost)[0])]]
                     words = "flow" if flow.loc[run.name] else "tank"
-                    text = f"a number: {own} along the body's axes needs {other} along those of the {words}"
+                    text = f"a number: {load} along the body's axes needs {other} along those of the {words}"
                     raise InputError(f"{run['file']}, row {run['row']}, column {other}", "nothing", text)
                 whole[:, i] += np.where(share == 0.0, 0.0, share * np.nan_to_num(values[:, j]))
         out.loc[rows, list(group)] = np.where(np.isnan(values), np.nan, whole)

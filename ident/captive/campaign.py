@@ -22,6 +22,7 @@ from ident.captive import published
 from ident.captive.axes import to_body
 from ident.captive.campaign_file import CampaignFile, read_header
 from ident.captive.channels import NotRising
+from ident.captive.complete import check_complete, check_words
 from ident.captive.conversions import (
     arm_rates,
     deflected_left_out,
@@ -35,13 +36,12 @@ from ident.captive.histories import Reduced
 from ident.captive.known_tests import tests
 from ident.captive.other_loads import tare_applies, without_hydrostatics, without_inertia, without_tare
 from ident.captive.readers.opening import inputs
-from ident.captive.run_table import DIRECT, MEASURED, NUMBERS, run_table, sigma
+from ident.captive.run_table import NUMBERS, run_table
 from ident.captive.runs import Gathered, source_runs
 from ident.captive.source import Source
 from ident.cluster import Spread, here
 from ident.output import Tell, html_table, silent
 from sim.boat.catalogue import OUTPUTS
-from sim.boat.parts import vehicle_terms
 from sim.boat.vehicle import Vehicle, load_vehicle
 from sim.files.errors import InputError
 from sim.files.frames import Frame
@@ -123,15 +123,6 @@ def _sources(folder: Path, header: CampaignFile, vehicle: Vehicle, none_yet: boo
     return sources
 
 
-def _check_words(folder: Path, runs: pd.DataFrame, allowed: dict[str, list[str]]) -> None:
-    for column, words in allowed.items():
-        bad = ~runs[column].isin(words)
-        if bad.any():
-            run = runs[bad].iloc[0]
-            place = f"{folder / run['file']}, row {run['row']}, column {column}"
-            raise InputError(place, repr(run[column]), ", ".join(words))
-
-
 def read_runs(
     folder: Path,
     header: CampaignFile,
@@ -164,8 +155,8 @@ def read_runs(
     words = {"test": list(tests().index), "part": vehicle.part_names(), "quality": list(header.quality)}
     for source in _sources(folder, header, vehicle, none_yet):
         for table in source_runs(folder, source, header, gathered, tell, spread):
-            _check_words(folder, table, {**words, "decoupled": ["", "True", "False"]})
-            _check_complete(folder, table, vehicle)
+            check_words(folder, table, {**words, "decoupled": ["", "True", "False"]})
+            check_complete(folder, table, vehicle)
     runs = pd.concat(gathered.tables, ignore_index=True) if gathered.tables else pd.DataFrame()
     for column in NUMBERS:
         if column not in runs:
@@ -182,53 +173,6 @@ def _refuse(refused: list[NotRising]) -> None:
     rest = f"; and in {len(more)} more: {rest}" if more else ""
     rest += f"; ... {len(more) - _SHOWN} more, see ident check" if len(more) > _SHOWN else ""
     raise InputError(first.where, first.found + rest, first.allowed)
-
-
-def _doubtful(runs: pd.DataFrame) -> pd.Series:
-    """True for runs that may lack something: where ``_check_complete`` has to look."""
-    blank = runs.reindex(columns=[*NUMBERS, *(sigma(o) for o in MEASURED)]).isna()
-    doubtful = (runs["run_id"] == "") | blank[list(MEASURED)].all(axis=1)
-    if "U" in runs:
-        doubtful |= runs["U"] < 0
-    for test in runs["test"].unique():
-        for need in str(tests().loc[test, "requires"]).split():
-            quantity = "plane" if need == "delta" else need
-            doubtful |= (runs["test"] == test) & (runs[quantity].isna() if quantity in runs else True)
-    known = {text: set(text.split()) <= set(MEASURED) for text in runs["exclude"].unique()}
-    doubtful |= ~runs["exclude"].map(known).astype(bool)
-    for output in MEASURED:
-        doubtful |= blank["rel_sigma"] & ~blank[output] & blank[sigma(output)]
-    return doubtful
-
-
-def _check_complete(folder: Path, runs: pd.DataFrame, vehicle: Vehicle) -> None:
-    """Every run has what its test needs, a load or coefficient, and an error to go with it."""
-    # A boat whose coefficients have no axis of depth is asked for none.
-    deep = {test for term in vehicle_terms(vehicle) if "D0" in term.axes for test in term.tests}
-    for _, run in runs[_doubtful(runs)].iterrows():
-        place = f"{folder / run['file']}, row {run['row']}"
-        for need in str(tests().loc[run["test"], "requires"]).split():
-            if need == "D0" and run["test"] not in deep:
-                continue
-            quantity = "plane" if need == "delta" else need
-            if pd.isna(run.get(quantity, np.nan)):
-                raise InputError(f"{place}, column {quantity}", "nothing", f"a number: a {run['test']} run needs it")
-        if not run["run_id"]:
-            raise InputError(f"{place}, column run_id", "nothing", "a name for the run")
-        if run.get("U", np.nan) < 0:
-            text = "zero or more: U is a speed, its direction is in alpha and beta"
-            raise InputError(f"{place}, column U", str(run["U"]), text)
-        measured = [o for o in (*OUTPUTS, *DIRECT) if pd.notna(run.get(o, np.nan))]
-        if not measured:
-            raise InputError(place, "no load and no coefficient", "at least one of X Y Z K M N, KT KQ, t, value")
-        wrong = [w for w in run["exclude"].split() if w not in (*OUTPUTS, *DIRECT)]
-        if wrong:
-            raise InputError(f"{place}, column exclude", repr(wrong[0]), ", ".join((*OUTPUTS, *DIRECT)))
-        relative = run.get("rel_sigma", np.nan)
-        if pd.isna(relative):
-            bare = [o for o in measured if pd.isna(run.get(f"s_{o}", np.nan))]
-            if bare:
-                raise InputError(f"{place}, column rel_sigma", "nothing", f"a number, or sigma_{bare[0]}_<unit>")
 
 
 def read_campaign(
@@ -286,6 +230,15 @@ def read_campaign(
         raise InputError(where, "no file of any [[source]], all of them awaited", text)
     if runs.empty:
         return Campaign(header, vehicle, run_table({}), digests, *histories, folder=str(folder))
+    runs = _converted(runs, folder, header, vehicle, frame)
+    said = {"campaign": header.name, "vehicle": vehicle.name, "runs": len(runs), "files": len(digests)}
+    _log.info("campaign read", extra=said)
+    return Campaign(header, vehicle, runs, digests, *histories)
+
+
+def _converted(runs: pd.DataFrame, folder: Path, header: CampaignFile, vehicle: Vehicle, frame: Frame) -> pd.DataFrame:
+    """Runs as read, named once each and turned to the program's frame at full scale, all of them finite."""
+    where = str(folder / "campaign.toml")
     runs["run_id"] = _own_names(runs)
     runs["copy_of"] = _originals(folder, runs)
     _check_used(header, runs, where)
@@ -294,17 +247,13 @@ def read_campaign(
     runs = published.to_program(runs, vehicle, header, point, str(folder))
     runs = deflected_left_out(runs, vehicle)
     runs = _in_program_frame(runs, header, frame, where)
-    bad = (
-        ~np.isfinite(runs[[*OUTPUTS, *(f"s_{o}" for o in OUTPUTS)]])
-        & runs[[*OUTPUTS, *(f"s_{o}" for o in OUTPUTS)]].notna()
-    )
-    if bad.any(axis=None):
-        run = runs[bad.any(axis=1)].iloc[0]
+    loads = runs[[*OUTPUTS, *(f"s_{o}" for o in OUTPUTS)]]
+    bad = (~np.isfinite(loads) & loads.notna()).any(axis=1)
+    if bad.any():
+        run = runs[bad].iloc[0]
         place = f"{folder / run['file']}, row {run['row']}"
         raise InputError(place, "a load that is not finite at full scale", "smaller numbers")
-    said = {"campaign": header.name, "vehicle": vehicle.name, "runs": len(runs), "files": len(digests)}
-    _log.info("campaign read", extra=said)
-    return Campaign(header, vehicle, runs, digests, *histories)
+    return runs
 
 
 def _check_named(header: CampaignFile, vehicle: Vehicle, where: str) -> None:

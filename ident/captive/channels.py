@@ -57,9 +57,9 @@ class NotRising(InputError):
     first_row : File row of the first stamp.
     """
 
-    def __init__(self, channels: Channels, clock: Clock, at: int, found: str) -> None:
+    def __init__(self, channels: Channels, clock: Clock, at: int, stamp: str) -> None:
         text = "a time that rises; or rate_hz in [source.reduction] where stamps have too few digits"
-        super().__init__(f"{channels.path}, data row {at + 1}, column time", found, text)
+        super().__init__(f"{channels.path}, data row {at + 1}, column time", stamp, text)
         self.file, self.row = channels.path.name, at + 1
         self.clock, self.first_row = clock, channels.first_row
 

@@ -111,12 +111,7 @@ def reduce(channels: Channels, rule: Reduction, run_id: str, frequency: float | 
         Without time, loads or enough samples; ``NotRising`` for a time that does not rise.
     """
     names = [q for q in channels.quantities if q != "time"]
-    loads = [q for q in names if q in OUTPUTS]
-    if not loads:
-        raise InputError(str(channels.path), f"channels {', '.join(channels.quantities)}", "at least one load")
-    if "time" not in channels.quantities and rule.rate_hz is None:
-        text = "a column time, or rate_hz in [source.reduction]"
-        raise InputError(str(channels.path), "no time", text)
+    _check_channels(channels, rule)
     sound, faults = _sound(channels, rule, names)
     line, stated = None, None
     if rule.kind == "oscillatory":
@@ -148,6 +143,20 @@ def reduce(channels: Channels, rule: Reduction, run_id: str, frequency: float | 
         weight, time, _, samples = whole.blocks()
         seen = delay.of_loads(time, samples, weight, names, frequency or 0.0, rule.delay_s)
         return harmonics, replace(reduced, delays=(*delays, *((seen,) if seen else ())))
+    return _means(names, fit, rule, span), reduced
+
+
+def _check_channels(channels: Channels, rule: Reduction) -> None:
+    """Refuse a history without loads, or without a clock."""
+    if not any(quantity in OUTPUTS for quantity in channels.quantities):
+        raise InputError(str(channels.path), f"channels {', '.join(channels.quantities)}", "at least one load")
+    if "time" not in channels.quantities and rule.rate_hz is None:
+        text = "a column time, or rate_hz in [source.reduction]"
+        raise InputError(str(channels.path), "no time", text)
+
+
+def _means(names: list[str], fit: reduction.Fitted, rule: Reduction, span: float) -> dict[str, Any]:
+    """Means of a steady or accelerated run and the standard errors of its loads."""
     values: dict[str, Any] = {}
     for c, name in enumerate(names):
         values[name] = float(fit.values[0, c])
@@ -155,7 +164,7 @@ def reduce(channels: Channels, rule: Reduction, run_id: str, frequency: float | 
             values[f"s_{name}"] = math.sqrt(max(float(fit.covariance[c, 0, 0]), 0.0))
     if rule.kind == "acceleration" and "U" in names:
         values["udot"] = float(fit.values[1, names.index("U")]) / span
-    return values, reduced
+    return values
 
 
 def _sound(channels: Channels, rule: Reduction, names: list[str]) -> tuple[Callable[[Clock | None], Timed], Usual]:

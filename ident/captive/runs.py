@@ -265,11 +265,11 @@ def _spread(table: pd.DataFrame, source: Source, header: CampaignFile, where: st
     """Rows of harmonics to the four states of each oscillation."""
     assert source.reduction is not None
     frame, ittc = header.frame.frame, header.frame.angles == "ittc"
-    found = []
+    instants = []
     for run in table.to_dict("records"):
         place = f"{where}, row {run['row']}"
-        found += states({str(k): v for k, v in run.items()}, source.reduction, frame, ittc, place)
-    return pd.DataFrame(found)
+        instants += states({str(k): v for k, v in run.items()}, source.reduction, frame, ittc, place)
+    return pd.DataFrame(instants)
 
 
 def _from_histories(
@@ -299,8 +299,8 @@ def _from_histories(
         values, one = reduce(channels, rule, words_of_run["run_id"], frequency)
         for quantity in values:
             if quantity in numbers and quantity != "frequency":
-                found = f"{quantity} is measured and stands in [source.constants]"
-                raise InputError(str(channels.path), found, "one of the two")
+                twice = f"{quantity} is measured and stands in [source.constants]"
+                raise InputError(str(channels.path), twice, "one of the two")
         run = (
             dict.fromkeys((*TEXT, "notes"), "") | {"source": f"{path.name}, reduced"} | words_of_run | numbers | values
         )
@@ -366,8 +366,8 @@ def _channels(
 def _stamps(sheet: Sheet, positions: list[int], clock: int, at: int) -> float:
     """Factor to seconds of a time column said to be in seconds whose stamps cannot be; 1 for others."""
     block = next(sheet.numbers(positions, clock), None)
-    found = unit_of(float(block[0, at]), float(block[1, at])) if block is not None and len(block) > 1 else None
-    return found[0] if found else 1.0
+    named = unit_of(float(block[0, at]), float(block[1, at])) if block is not None and len(block) > 1 else None
+    return named[0] if named else 1.0
 
 
 def _no_idle_rule(channels: Channels, rule: Reduction, where: str) -> None:

@@ -87,11 +87,11 @@ def constants(folder: Path, path: Path, source: Source) -> tuple[dict[str, str],
     given: dict[str, Any] = dict(source.constants)
     if source.match:
         name = path.relative_to(folder).as_posix()
-        found = search(source.match, name)
-        if not found:
+        hit = search(source.match, name)
+        if not hit:
             raise InputError(f"{folder / 'campaign.toml'}, key source.match", f"{name!r} does not match", source.match)
-        named = {k: v for k, v in found.groupdict().items() if v is not None}
-        given |= {k: _of_name(k, v, name[: found.start(found.re.groupindex[k])], toml) for k, v in named.items()}
+        named = {k: v for k, v in hit.groupdict().items() if v is not None}
+        given |= {k: _of_name(k, v, name[: hit.start(hit.re.groupindex[k])], toml) for k, v in named.items()}
     words: dict[str, str] = {}
     numbers: dict[str, float] = {}
     primed: set[str] = set()
@@ -132,8 +132,8 @@ def _of_name(key: str, text: str, before: str, where: str) -> str:
     quantity = suffixed()[key][0] if key in suffixed() else key
     mark = re.search(r"(?:^|[^A-Za-z])([mpnMPN])$", before)
     if mark and text[:1].isdigit() and signed(quantity):
-        found = f"{mark[1]!r} right before {text!r}, outside of the group {key}"
-        raise InputError(f"{where}, key source.match", found, f"(?P<{key}>[mp]?...): m and n are minus, p is plus")
+        misplaced = f"{mark[1]!r} right before {text!r}, outside of the group {key}"
+        raise InputError(f"{where}, key source.match", misplaced, f"(?P<{key}>[mp]?...): m and n are minus, p is plus")
     hit = _IN_NAMES.fullmatch(text)
     if hit is None:
         return text

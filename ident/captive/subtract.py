@@ -63,7 +63,7 @@ def taken_columns(sheet: Sheet, source: Source, header: CampaignFile, totals: se
         For a column that is no load, a total that is not measured, or a moment of
         the total to which the part's share is not stated.
     """
-    found = []
+    taken = []
     for k, one in enumerate(source.subtract):
         place = f"{where}, key source.subtract.{k}"
         kinds = {}
@@ -82,8 +82,8 @@ def taken_columns(sheet: Sheet, source: Source, header: CampaignFile, totals: se
             end = f"_{harmonic}" if harmonic else ""
             shares = {kind.quantity: one.factor}
             shares |= {f"{m}{end}": one.factor * arm for (m, f), arm in levers.items() if f == load}
-            found.append(Taken(at, kind, {q: s for q, s in shares.items() if q in totals}, one.what))
-    return found
+            taken.append(Taken(at, kind, {q: s for q, s in shares.items() if q in totals}, one.what))
+    return taken
 
 
 def _levers(one: Subtract, header: CampaignFile) -> dict[tuple[str, str], float]:

@@ -92,8 +92,8 @@ class Uses:
             raise InputError(f"{self.where}, key source.plus_minus", "declared, and no cell has such a sign", "nothing")
         for mark in source.marks:
             if f"marks.{mark}" not in self.beside:
-                found = f"{mark!r}, and no number has it behind"
-                raise InputError(f"{self.where}, key source.marks", found, "marks that are there")
+                idle_mark = f"{mark!r}, and no number has it behind"
+                raise InputError(f"{self.where}, key source.marks", idle_mark, "marks that are there")
         if source.normalisation and not self.primed:
             text = "nothing: every column of the files has a unit, so nothing is made dimensional"
             raise InputError(f"{self.where}, key source.normalisation", repr(source.normalisation), text)

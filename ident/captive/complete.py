@@ -1,0 +1,96 @@
+"""Whether every run of a campaign says what its test needs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from ident.captive.known_tests import tests
+from ident.captive.run_table import DIRECT, MEASURED, NUMBERS, sigma
+from sim.boat.catalogue import OUTPUTS
+from sim.boat.parts import vehicle_terms
+from sim.boat.vehicle import Vehicle
+from sim.files.errors import InputError
+
+
+def check_words(folder: Path, runs: pd.DataFrame, allowed: dict[str, list[str]]) -> None:
+    """Every text column holds words of its list.
+
+    Parameters
+    ----------
+    folder : Of the campaign, for the message.
+    runs : As read.
+    allowed : Column -> its words.
+
+    Raises
+    ------
+    InputError
+        Naming file, row and column of the first word that is another.
+    """
+    for column, words in allowed.items():
+        bad = ~runs[column].isin(words)
+        if bad.any():
+            run = runs[bad].iloc[0]
+            place = f"{folder / run['file']}, row {run['row']}, column {column}"
+            raise InputError(place, repr(run[column]), ", ".join(words))
+
+
+def _doubtful(runs: pd.DataFrame) -> pd.Series:
+    """True for runs that may lack something: where ``check_complete`` has to look."""
+    blank = runs.reindex(columns=[*NUMBERS, *(sigma(o) for o in MEASURED)]).isna()
+    doubtful = (runs["run_id"] == "") | blank[list(MEASURED)].all(axis=1)
+    if "U" in runs:
+        doubtful |= runs["U"] < 0
+    for test in runs["test"].unique():
+        for need in str(tests().loc[test, "requires"]).split():
+            quantity = "plane" if need == "delta" else need
+            doubtful |= (runs["test"] == test) & (runs[quantity].isna() if quantity in runs else True)
+    known = {text: set(text.split()) <= set(MEASURED) for text in runs["exclude"].unique()}
+    doubtful |= ~runs["exclude"].map(known).astype(bool)
+    for output in MEASURED:
+        doubtful |= blank["rel_sigma"] & ~blank[output] & blank[sigma(output)]
+    return doubtful
+
+
+def check_complete(folder: Path, runs: pd.DataFrame, vehicle: Vehicle) -> None:
+    """Every run has what its test needs, a load or coefficient, and an error to go with it.
+
+    Parameters
+    ----------
+    folder : Of the campaign, for the message.
+    runs : As read, in SI.
+    vehicle : Its term set says whether depth is wanted.
+
+    Raises
+    ------
+    InputError
+        Naming file, row and column of the first run that lacks something.
+    """
+    # A boat whose coefficients have no axis of depth is asked for none.
+    deep = {test for term in vehicle_terms(vehicle) if "D0" in term.axes for test in term.tests}
+    for _, run in runs[_doubtful(runs)].iterrows():
+        place = f"{folder / run['file']}, row {run['row']}"
+        for need in str(tests().loc[run["test"], "requires"]).split():
+            if need == "D0" and run["test"] not in deep:
+                continue
+            quantity = "plane" if need == "delta" else need
+            if pd.isna(run.get(quantity, np.nan)):
+                raise InputError(f"{place}, column {quantity}", "nothing", f"a number: a {run['test']} run needs it")
+        if not run["run_id"]:
+            raise InputError(f"{place}, column run_id", "nothing", "a name for the run")
+        if run.get("U", np.nan) < 0:
+            text = "zero or more: U is a speed, its direction is in alpha and beta"
+            raise InputError(f"{place}, column U", str(run["U"]), text)
+        measured = [o for o in (*OUTPUTS, *DIRECT) if pd.notna(run.get(o, np.nan))]
+        if not measured:
+            raise InputError(place, "no load and no coefficient", "at least one of X Y Z K M N, KT KQ, t, value")
+        wrong = [w for w in run["exclude"].split() if w not in (*OUTPUTS, *DIRECT)]
+        if wrong:
+            raise InputError(f"{place}, column exclude", repr(wrong[0]), ", ".join((*OUTPUTS, *DIRECT)))
+        relative = run.get("rel_sigma", np.nan)
+        if pd.isna(relative):
+            bare = [o for o in measured if pd.isna(run.get(f"s_{o}", np.nan))]
+            if bare:
+                raise InputError(f"{place}, column rel_sigma", "nothing", f"a number, or sigma_{bare[0]}_<unit>")
