@@ -144,36 +144,72 @@ def extend_axis(nodes: Array, rule: str) -> tuple[Array, Array]:
     return extended, matrix
 
 
-def _line_interpolation(index: tuple[int, ...], axes: Sequence[Array], measured: NDArray[np.bool_]):
-    """(node, weight) pairs for a node bracketed by runs along one axis, else None."""
+# Nodes looked at together when a grid is completed, times the nodes of a plane: bounds the memory.
+_AT_ONCE = 1 << 20
+# Grid nodes, and the weights by which others replace a missing one: (m, d), (p, m, d) and (p, m).
+Replaced = tuple[NDArray[np.int64], NDArray[np.int64], Array]
+
+
+def _line_interpolation(missing: NDArray[np.int64], axes: Sequence[Array], measured: NDArray[np.bool_]) -> Replaced:
+    """Nodes bracketed by runs along an axis, the first such axis, between the nearest of both sides."""
+    ends = np.stack([missing, missing])
+    share, open_ = np.zeros(len(missing)), np.ones(len(missing), dtype=bool)
     for k, nodes in enumerate(axes):
-        line = measured[tuple(slice(None) if m == k else i for m, i in enumerate(index))]
-        below, above = np.flatnonzero(line[: index[k]]), np.flatnonzero(line[index[k] :])
-        if below.size and above.size:
-            lo, hi = int(below[-1]), int(above[0]) + index[k]
-            t = (nodes[index[k]] - nodes[lo]) / (nodes[hi] - nodes[lo])
-            place = [(*index[:k], i, *index[k + 1 :]) for i in (lo, hi)]
-            return [(place[0], 1.0 - t), (place[1], t)]
-    return None
+        shape = [-1 if m == k else 1 for m in range(len(axes))]
+        number = np.arange(nodes.size).reshape(shape)
+        below = np.maximum.accumulate(np.where(measured, number, -1), axis=k)
+        above = np.flip(np.minimum.accumulate(np.flip(np.where(measured, number, nodes.size), k), axis=k), k)
+        place = tuple(missing.T)
+        low, high = below[place], above[place]
+        here = open_ & (low >= 0) & (high < nodes.size)
+        low, high = low[here], high[here]
+        ends[0, here, k], ends[1, here, k] = low, high
+        share[here] = (nodes[missing[here, k]] - nodes[low]) / (nodes[high] - nodes[low])
+        open_ &= ~here
+    done = ~open_
+    return missing[done], ends[:, done], np.stack([1.0 - share[done], share[done]])
 
 
-def _without_interaction(index: tuple[int, ...], known: NDArray[np.bool_]):
-    """(node, weight) triple C(a,b0) + C(a0,b) - C(a0,b0) from the nearest known nodes."""
-    best, corners = None, None
-    for j, k in itertools.combinations(range(len(index)), 2):
-        plane = known[tuple(slice(None) if m in (j, k) else i for m, i in enumerate(index))]
-        # At (a, b): itself and the two corners it shares with the missing node are known.
-        usable = plane & plane[:, index[k], None] & plane[None, index[j], :]
-        usable[index[j], :] = usable[:, index[k]] = False
-        away = [np.abs(np.arange(n) - i) for n, i in zip(plane.shape, (index[j], index[k]), strict=True)]
-        distance = np.where(usable, np.add.outer(*away), sum(plane.shape) + 1)
-        a, b = (int(i) for i in np.unravel_index(int(distance.argmin()), plane.shape))
-        if usable[a, b] and (best is None or distance[a, b] < best):
-            keep_j, keep_k, neither = list(index), list(index), list(index)
-            keep_j[k], keep_k[j], neither[j], neither[k] = b, a, a, b
-            triple = [tuple(keep_j), tuple(keep_k), tuple(neither)]
-            best, corners = int(distance[a, b]), list(zip(triple, (1.0, 1.0, -1.0), strict=True))
-    return corners
+def _without_interaction(missing: NDArray[np.int64], known: NDArray[np.bool_]) -> Replaced:
+    """C(a,b0) + C(a0,b) - C(a0,b0) from the nearest known nodes, where there are such three."""
+    count, axes = missing.shape
+    best = np.full(count, np.iinfo(np.int64).max)
+    corners = np.stack([missing] * 3)
+    for j, k in itertools.combinations(range(axes), 2):
+        planes = np.moveaxis(known, (j, k), (-2, -1))
+        others = [m for m in range(axes) if m not in (j, k)]
+        size = known.shape[j] * known.shape[k]
+        for part in np.array_split(np.arange(count), -(-count * size // _AT_ONCE) or 1):
+            at = missing[part]
+            distance, a, b = _nearest_corner(planes[tuple(at[:, others].T)], at[:, j], at[:, k])
+            nearer = distance < best[part]
+            a, b, part = a[nearer], b[nearer], part[nearer]
+            best[part] = distance[nearer]
+            corners[:, part] = missing[part]
+            corners[0, part, k] = corners[2, part, k] = b
+            corners[1, part, j] = corners[2, part, j] = a
+    done = best < np.iinfo(np.int64).max
+    return missing[done], corners[:, done], np.outer([1.0, 1.0, -1.0], np.ones(int(done.sum())))
+
+
+def _nearest_corner(
+    plane: NDArray[np.bool_], row: NDArray[np.int64], column: NDArray[np.int64]
+) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+    """Of each missing node the nearest (a, b) that is known as are (a, column) and (row, b); how far, where.
+
+    Parameters
+    ----------
+    plane : (m, rows, columns), or (rows, columns) that all of them lie in: known nodes.
+    row, column : (m,) of the missing nodes.
+    """
+    each, (rows, columns) = np.arange(row.size), plane.shape[-2:]
+    plane = np.broadcast_to(plane, (row.size, rows, columns))
+    # A missing node is not known itself, so that neither its row nor its column is usable.
+    usable = plane & plane[each, :, column][:, :, None] & plane[each, row, :][:, None, :]
+    away = np.abs(np.arange(rows) - row[:, None])[:, :, None] + np.abs(np.arange(columns) - column[:, None])[:, None, :]
+    far = np.where(usable, away, np.iinfo(np.int64).max).reshape(row.size, -1)
+    first = far.argmin(axis=1)
+    return far[each, first], first // columns, first % columns
 
 
 @lru_cache(maxsize=256)
@@ -184,30 +220,24 @@ def _complete(points: bytes, shape: tuple[int, int]) -> tuple[tuple[Array, ...],
     grid = tuple(a.size for a in axes)
     matrix = np.zeros((*grid, shape[0]))
     measured = np.zeros(grid, dtype=bool)
-    for row, point in enumerate(x):
-        index = tuple(int(np.searchsorted(a, c)) for a, c in zip(axes, point, strict=True))
-        matrix[index][row] = 1.0
-        measured[index] = True
+    place = tuple(np.searchsorted(a, x[:, k]) for k, a in enumerate(axes))
+    matrix[(*place, np.arange(shape[0]))] = 1.0
+    measured[place] = True
     known = measured.copy()
-    missing = [i for i in np.ndindex(*grid) if not known[i]]
     for attempt in range(1 + sum(grid)):
-        snapshot, left = known.copy(), []
-        for index in missing:
-            first = attempt == 0
-            parts = _line_interpolation(index, axes, measured) if first else _without_interaction(index, snapshot)
-            if parts is None:
-                left.append(index)
-                continue
-            matrix[index] = sum(w * matrix[i] for i, w in parts)
-            known[index] = True
-        if not left or (attempt and len(left) == len(missing)):
-            missing = left
+        missing = np.argwhere(~known)
+        if not len(missing):
             break
-        missing = left
+        completed = _without_interaction(missing, known) if attempt else _line_interpolation(missing, axes, measured)
+        nodes, sources, weights = completed
+        if attempt and not len(nodes):
+            break
+        matrix[tuple(nodes.T)] = sum(w[:, None] * matrix[tuple(s.T)] for s, w in zip(sources, weights, strict=True))
+        known[tuple(nodes.T)] = True
     centres = np.argwhere(measured)
-    for index in missing:
-        nearest = centres[np.argmin(np.abs(centres - np.array(index)).sum(axis=1))]
-        matrix[index] = matrix[tuple(nearest)]
+    for index in np.argwhere(~known):
+        nearest = centres[np.argmin(np.abs(centres - index).sum(axis=1))]
+        matrix[tuple(index)] = matrix[tuple(nearest)]
     return axes, matrix.reshape(-1, shape[0]), measured.reshape(-1)
 
 
