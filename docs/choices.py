@@ -15,7 +15,7 @@ from ident.fitting.fit import given_of
 from ident.validation.board import geometric_mean
 from ident.validation.boats import Boat, Fleet
 from ident.validation.result import Validation
-from ident.validation.validate import errors, flights, validate
+from ident.validation.validate import errors, flights, validated
 from sim.boat.coefficients import Coefficients
 from sim.files.toml_files import bundled
 from sim.flight.case import load_case
@@ -33,7 +33,7 @@ def choices(db: str, campaign: Campaign) -> str:
     """
     fleet = Fleet(db)
     names = [n for n in bundled("cases") if load_case(n)[0].vehicle == VEHICLE and load_case(n)[0].reference]
-    held = [one for one in (validate(n, db, fleet=fleet) for n in names) if one.errors]
+    held = [one for one in (validated(n, fleet) for n in names) if one.errors]
     base, given = held[0].boat, given_of(campaign)
     rows, every = measured_rows(base.rows), {m.name for m in methods()}
 

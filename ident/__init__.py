@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from ident.database.compare import Change, Difference
     from ident.database.versions import Database, DatabaseVersion
     from ident.fitting.fit import Fit, fit
+    from ident.options import Conditions, Diagnostics, OwnReference, Work
     from ident.output import Results
     from ident.planning.matrix import Need, Plan
     from ident.planning.plan import plan
@@ -76,6 +77,10 @@ _PLACES = {
     "Stability": "ident.analysis.result",
     "Linear": "ident.analysis.result",
     "Results": "ident.output",
+    "Work": "ident.options",
+    "Diagnostics": "ident.options",
+    "Conditions": "ident.options",
+    "OwnReference": "ident.options",
     "InputError": "sim.files.errors",
     "NoEquilibrium": "sim.flight.trim",
 }
@@ -113,6 +118,10 @@ __all__ = [  # noqa: RUF022  (in the order of the work)
     "Stability",
     "Linear",
     "Results",
+    "Work",
+    "Diagnostics",
+    "Conditions",
+    "OwnReference",
     "InputError",
     "NoEquilibrium",
 ]

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import dataclasses
 import functools
+import inspect
 import warnings
-from collections.abc import Callable
-from typing import ParamSpec, TypeVar
+from collections.abc import Callable, Mapping
+from typing import Any, ParamSpec, TypeVar
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -39,5 +41,53 @@ def deprecated(since: str, instead: str) -> Callable[[Callable[P, R]], Callable[
             return function(*arguments, **named)
 
         return warned
+
+    return mark
+
+
+def gathered(
+    since: str, kinds: Mapping[str, type[Any]], **into: str | tuple[str, str, Callable[[Any], Any] | None]
+) -> Callable[[Callable[P, R]], Callable[P, R]]:
+    """Go on to take keywords that now are fields of an option class, with a warning.
+
+    Parameters
+    ----------
+    since : Version that announced it.
+    kinds : Parameter -> its frozen dataclass. A value that is none is taken for the first field of it.
+    **into : Keyword -> parameter that has a field of that name; or parameter, field, and what makes one of the other.
+
+    Examples
+    --------
+    >>> from dataclasses import dataclass
+    >>> @dataclass(frozen=True)
+    ... class Sea:
+    ...     height: float = 0.0
+    >>> @gathered("0.3", {"sea": Sea}, height="sea")
+    ... def fly(sea=Sea()):
+    ...     return sea.height
+    >>> with warnings.catch_warnings(record=True) as caught:
+    ...     warnings.simplefilter("always")
+    ...     fly(height=2.0), str(caught[0].message)
+    (2.0, 'fly(height=...) is deprecated since ident 0.3: use sea=Sea(height=...)')
+    """
+
+    def mark(function: Callable[P, R]) -> Callable[P, R]:
+        usual = {name: p.default for name, p in inspect.signature(function).parameters.items()}
+
+        @functools.wraps(function)
+        def taken(*arguments: P.args, **named: P.kwargs) -> R:
+            for old in [name for name in named if name in into]:
+                where = into[old]
+                parameter, field, made = (where, old, None) if isinstance(where, str) else where
+                kind, value = kinds[parameter], named.pop(old)
+                call = f"{function.__name__}({old}=...)"
+                use = f"{parameter}={kind.__name__}({field}=...)"
+                warnings.warn(f"{call} is deprecated since ident {since}: use {use}", DeprecationWarning, stacklevel=2)
+                now = named.get(parameter, usual[parameter])
+                now = now if isinstance(now, kind) else kind(now)
+                named[parameter] = dataclasses.replace(now, **{field: made(value) if made else value})
+            return function(*arguments, **named)
+
+        return taken
 
     return mark

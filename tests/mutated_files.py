@@ -256,7 +256,7 @@ class Room:
 
     def used(self, kind: str, path: Path) -> str:
         """What a command does with a file, short of what takes minutes; raises what the command shows as a message."""
-        import ident
+        from ident.validation.validate import validated
 
         if self.asked % self.each:
             return self.read(kind, path)
@@ -265,11 +265,11 @@ class Room:
                 case = self.folder / "starter" / "zigzag.toml"
             else:
                 case = self.folder / "cases" / ("suboff-hzz10.toml" if "suboff" in path.name else "roll-decay.toml")
-            return said(ident.validate(case, self.db, vehicle=path, fleet=self.fleet).to_dict())
+            return said(validated(case, self.fleet, vehicle=path).to_dict())
         if kind == "case":
-            return said(ident.validate(path, self.db, fleet=self.fleet).to_dict())
+            return said(validated(path, self.fleet).to_dict())
         if kind == "reference":
-            return said(ident.validate(self.held(path), self.db, reference=path, fleet=self.fleet).to_dict())
+            return said(validated(self.held(path), self.fleet, reference=path).to_dict())
         if kind == "calibration":
             return self.calibrated(path)
         if kind == "campaign":
@@ -284,13 +284,13 @@ class Room:
         """What is done with a file before anything is flown, checked against another or fitted."""
         from ident.calibration.file import load_calibration, parameters
         from ident.captive.campaign import read_campaign
+        from ident.options import Conditions
         from ident.trials.consistency import check_recording
         from ident.trials.earth import in_program_axes
         from ident.trials.maneuvers import maneuver_of
         from ident.trials.reading import read_recording
         from ident.trials.spec import load_spec
         from ident.trials.spikes import without_spikes
-        from ident.validation.other_boat import Asked
         from ident.validation.validate import _held_against
         from sim.boat.vehicle import load_vehicle
 
@@ -298,10 +298,10 @@ class Room:
             ship = load_vehicle(path)
             return said({"vehicle": ship.model_dump(), "rows": len(self.fleet.boat(ship).rows)})
         if kind == "case":
-            held, ship, _, notes = _held_against(path, None, Asked(), None, None, None)
+            held, ship, _, notes = _held_against(path, None, Conditions(), None)
             return said({"case": held.case.model_dump(), "vehicle": ship.name, "notes": notes})
         if kind == "reference":
-            held, _, _, notes = _held_against(self.held(path), None, Asked(), path, None, None)
+            held, _, _, notes = _held_against(self.held(path), None, Conditions(), path)
             rows = {s: sorted(channels) for s, channels in held.series.data.items()}
             return said({"rows": rows, "notes": notes})
         if kind == "calibration":

@@ -11,7 +11,7 @@ from click.testing import CliRunner
 from flights_in_waves import made_flight
 from PIL import Image
 
-from ident.animation.film import animate, sampled
+from ident.animation.film import Film, animate, sampled
 from ident.animation.silhouette import from_above, from_the_side, silhouette
 from ident.commands.animate import animate as command
 from sim.boat.vehicle import load_vehicle
@@ -37,7 +37,7 @@ def test_gif_has_the_frames_and_the_duration_asked(flight, boat, tmp_path):
     seen = []
     waves = regular(3.25, 140.9, 2.5, 1025.0, 9.81)
     path = animate(
-        flight, boat, waves, tmp_path / "new" / "a.gif", frames=12, fps=10.0, title="Made", each=lambda: seen.append(1)
+        flight, boat, waves, tmp_path / "new" / "a.gif", Film(12, 10.0, title="Made"), each=lambda: seen.append(1)
     )
     with Image.open(path) as film:
         assert film.n_frames == len(seen) == 12
@@ -63,11 +63,11 @@ def test_what_cannot_be_written_is_refused_in_one_message(flight, boat, tmp_path
         animate(flight, boat, None, tmp_path / "a.mp4")
     (tmp_path / "file").write_text("x")
     with pytest.raises(InputError, match="cannot be written"):
-        animate(flight, boat, None, tmp_path / "file" / "a.gif", frames=2)
+        animate(flight, boat, None, tmp_path / "file" / "a.gif", Film(frames=2))
     with pytest.raises(InputError, match="frames"):
-        animate(flight, boat, None, tmp_path / "a.gif", frames=1)
+        animate(flight, boat, None, tmp_path / "a.gif", Film(frames=1))
     with pytest.raises(InputError, match="start and end"):
-        animate(flight, boat, None, tmp_path / "a.gif", start=50.0, end=10.0)
+        animate(flight, boat, None, tmp_path / "a.gif", Film(start=50.0, end=10.0))
     assert [p.name for p in tmp_path.iterdir()] == ["file"]
 
 
@@ -76,7 +76,7 @@ def test_mp4_where_ffmpeg_is(flight, boat, tmp_path):
 
     if not FFMpegWriter.isAvailable():
         pytest.skip("needs ffmpeg")
-    path = animate(flight, boat, None, tmp_path / "a.mp4", frames=4, fps=10.0)
+    path = animate(flight, boat, None, tmp_path / "a.mp4", Film(frames=4, fps=10.0))
     assert path.read_bytes()[4:8] == b"ftyp"
 
 

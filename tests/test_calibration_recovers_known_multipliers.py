@@ -18,6 +18,7 @@ from ident.calibration.sensitivity import sensitivity as what_decides
 from ident.calibration.version import calibrate as run
 from ident.calibration.version import calibrated_rows
 from ident.cli import main
+from ident.options import Diagnostics
 from sim.boat.coefficients import Coefficients
 from sim.boat.database import own_version, read_rows, versions
 from sim.boat.row_codec import correlation_matrix
@@ -192,7 +193,7 @@ def test_the_evidence_frees_what_the_maneuver_asks_for_and_holds_the_rest(folder
     path.write_text(
         path.read_text("utf-8").replace('source = "made"', 'source = "made"\nchoose = "evidence"', 1), "utf-8"
     )
-    done = run(path, db, left_out=False, posterior=120, seed=2)
+    done = run(path, db, left_out=False, diagnostics=Diagnostics(posterior=120, seed=2))
     found = {g.name: g for g in done.summary.groups}
     chosen = {name for name, g in found.items() if g.chosen}
     assert {"planes", "yaw_damping"} <= chosen <= set(GROUPS)

@@ -11,7 +11,8 @@ from click.testing import CliRunner
 
 from ident.cli import main
 from ident.fitting.fit import fit
-from ident.validation.other_boat import Asked, for_boat
+from ident.options import Conditions
+from ident.validation.other_boat import for_boat
 from ident.validation.validate import validate
 from sim.boat.vehicle import load_vehicle
 from sim.files.errors import InputError
@@ -48,7 +49,7 @@ def test_roll_decay_of_another_boat_is_not_scored_against_bb2s_experiment(suboff
 def test_times_and_speed_of_a_standard_maneuver_follow_froude():
     case, where = load_case("turning-circle")
     boat = load_vehicle("suboff")
-    moved, notes = for_boat(case, where, boat, Asked())
+    moved, notes = for_boat(case, where, boat, Conditions())
     ratio = boat.particulars.length.value / load_vehicle("bb2").particulars.length.value
     assert moved.initial.speed_mps == pytest.approx(case.initial.speed_mps * np.sqrt(ratio))
     assert moved.run.duration_s == pytest.approx(case.run.duration_s * np.sqrt(ratio))
@@ -64,24 +65,24 @@ def test_times_and_speed_of_a_standard_maneuver_follow_froude():
 
 def test_the_own_boat_flies_its_case_as_it_is_written():
     case, where = load_case("hzz20")
-    same, notes = for_boat(case, where, load_vehicle("bb2"), Asked())
+    same, notes = for_boat(case, where, load_vehicle("bb2"), Conditions())
     assert (same, notes) == (case, [])
 
 
 def test_angles_are_those_the_planes_can_do_and_the_title_says_them(tmp_path):
     case, where = load_case("turning-circle")
     boat = load_vehicle(limited(tmp_path, 15.0))
-    moved, notes = for_boat(case, where, boat, Asked())
+    moved, notes = for_boat(case, where, boat, Conditions())
     assert moved.command.dH.value_deg == 15.0
     assert "dH 15 deg" in moved.title
     assert any("the planes stop at 15 deg" in note for note in notes)
     spiral, where = load_case("direct-spiral")
-    moved, _ = for_boat(spiral, where, boat, Asked())
+    moved, _ = for_boat(spiral, where, boat, Conditions())
     assert max(s.value_deg for s in moved.command.dH.step) == pytest.approx(15.0)
-    asked, _ = for_boat(case, where, boat, Asked(speed_mps=2.0, depth_m=7.0, angle_deg=10.0))
+    asked, _ = for_boat(case, where, boat, Conditions(speed_mps=2.0, depth_m=7.0, angle_deg=10.0))
     assert (asked.initial.speed_mps, asked.initial.depth_m, asked.command.dH.value_deg) == (2.0, 7.0, 10.0)
     with pytest.raises(InputError, match="a case that commands an angle"):
-        for_boat(*load_case("roll-decay"), boat, Asked(angle_deg=5.0))
+        for_boat(*load_case("roll-decay"), boat, Conditions(angle_deg=5.0))
 
 
 def test_options_and_actuators_at_their_limit(suboff_db, tmp_path):

@@ -23,7 +23,7 @@ from sim.compiled_cache import (
     remove_stale,
     sources_key,
 )
-from sim.flight.maneuver import run as run_flight
+from sim.flight.maneuver import integrate as run_flight
 
 ROOT = Path(__file__).parents[1]
 SIM = ROOT / "sim"

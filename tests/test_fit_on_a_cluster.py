@@ -13,6 +13,7 @@ from ident.captive.campaign import read_campaign
 from ident.cluster import cluster as over
 from ident.fitting.fit import fit
 from ident.identification import stage_solve
+from ident.options import Work
 from ident.validation import band_summary, bands
 from sim.files.errors import InputError
 from sim.flight.case import load_case
@@ -58,7 +59,7 @@ def test_two_processes_fit_what_one_does(cluster, histories, tmp_path_factory, m
     db = tmp_path_factory.mktemp("db")
     monkeypatch.setattr(stage_solve, "_SHARE", 1)
     (alone,) = fit(histories, db / "alone", measured_only=True)
-    (there,) = fit(histories, db / "there", measured_only=True, dask=cluster)
+    (there,) = fit(histories, db / "there", measured_only=True, work=Work(dask=cluster))
     assert len(alone.rows) > 3
     assert alone.digest == there.digest
 

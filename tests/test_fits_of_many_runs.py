@@ -18,6 +18,7 @@ from ident.fitting.fit import fit
 from ident.identification import solver
 from ident.identification.identify import identify
 from ident.identification.stage_solve import solve_stage, weights
+from ident.options import Work
 
 BB2 = Path(__file__).resolve().parents[1] / "raw_captive_data" / "bb2"
 
@@ -144,7 +145,9 @@ def test_loads_that_agree_by_chance_are_no_frozen_column_and_a_frozen_one_is():
 
 def test_a_fit_tells_how_far_it_is(tmp_path):
     said: dict[str, list[tuple[int, int]]] = {}
-    (done,) = fit(BB2, str(tmp_path / "db"), tell=lambda what, n, of: said.setdefault(what, []).append((n, of)))
+    (done,) = fit(
+        BB2, str(tmp_path / "db"), work=Work(tell=lambda what, n, of: said.setdefault(what, []).append((n, of)))
+    )
     assert {"identifying", "checking", "reading towing.csv"} <= set(said)
     for steps in said.values():
         counts, (total,) = [n for n, _ in steps], {of for _, of in steps}

@@ -12,6 +12,7 @@ import pytest
 from click.testing import CliRunner
 
 from ident.cli import main
+from ident.options import OwnReference
 from ident.validation.band_summary import inside
 from ident.validation.bands import fly_samples
 from ident.validation.validate import validate
@@ -49,8 +50,11 @@ def test_frame_option_turns_the_file(tmp_path, fitted_db):
 
     path = _own(tmp_path / "mine.csv", turn=turn)
     bundled = validate("turn20-23.69m", fitted_db).to_dict()["references"]
-    assert validate("turn20-23.69m", fitted_db, reference=path, frame="program").to_dict()["references"] == bundled
-    wrong = validate("turn20-23.69m", fitted_db, reference=path, frame="source").to_dict()["references"]
+    assert (
+        validate("turn20-23.69m", fitted_db, reference=OwnReference(path, frame="program")).to_dict()["references"]
+        == bundled
+    )
+    wrong = validate("turn20-23.69m", fitted_db, reference=OwnReference(path, frame="source")).to_dict()["references"]
     assert wrong["CFD"]["x"]["rmse"] > bundled["CFD"]["x"]["rmse"]
 
 

@@ -161,6 +161,27 @@ def test_what_a_contributor_is_told_to_run_is_there():
         assert tool in dev
 
 
+def test_former_keywords_of_the_public_functions_go_on_and_say_what_to_use():
+    from ident.deprecation import gathered
+    from ident.options import Conditions, OwnReference
+
+    @gathered("0.2", {"at": Conditions, "record": OwnReference}, speed=("at", "speed_mps", None), frame="record")
+    def fly(at=Conditions(), record=None):  # noqa: B008
+        return at, record
+
+    with pytest.warns(
+        DeprecationWarning, match=r"fly\(speed=...\) .* 0.2: use at=Conditions\(speed_mps=...\)"
+    ) as caught:
+        assert fly(speed=2.0) == (Conditions(speed_mps=2.0), None)
+    assert caught[0].filename == __file__
+    with pytest.warns(DeprecationWarning, match="use record=OwnReference"):
+        assert fly(record="a.csv", frame="program")[1] == OwnReference("a.csv", frame="program")
+    with pytest.warns(DeprecationWarning, match="work=Work"), pytest.raises(ident.InputError, match="not a folder"):
+        ident.fit("nowhere", wait=1.0)
+    with pytest.raises(TypeError, match="wheight"):
+        fly(wheight=2.0)
+
+
 def test_what_is_deprecated_says_since_when_and_what_instead():
     from ident.deprecation import deprecated
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from trial_records import turned, write
 
+from ident.options import OwnReference
 from ident.validation.trial_reference import DRIVEN, TRIAL
 from ident.validation.validate import validate
 from sim.files.errors import InputError
@@ -50,7 +51,7 @@ def done(fitted_db, record):
     """Held against the record, its execute stated: the sampling leaves it open by a quarter of a second."""
     spec = record.with_name("trial.toml")
     spec.write_text("execute_s = 30.0\n", encoding="utf-8")
-    return validate("hzz20", fitted_db, reference=record, trial=spec)
+    return validate("hzz20", fitted_db, reference=OwnReference(record, trial=spec))
 
 
 def test_what_is_left_is_the_noise(done):
@@ -142,7 +143,7 @@ def test_noisy_series_of_ones_own_are_measured_on_a_smooth_path(fitted_db, fligh
     psi = np.degrees(flight["psi"][::5]) + np.random.default_rng(1).normal(0.0, 0.2, t.size)
     lines = ["source,channel,t,value,unit", *[f"A,psi,{a},{b},deg" for a, b in zip(t, psi, strict=True)]]
     (tmp_path / "own.csv").write_text("\n".join(lines), encoding="utf-8")
-    done = validate("hzz20", fitted_db, reference=tmp_path / "own.csv", frame="program")
+    done = validate("hzz20", fitted_db, reference=OwnReference(tmp_path / "own.csv", frame="program"))
     for k in (1, 2):
         found = done.metrics[f"overshoot_{k}_deg"]
         assert found["A"] == pytest.approx(found["simulated"], abs=0.5)

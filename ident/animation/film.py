@@ -317,17 +317,31 @@ def _pictures(scene: _Scene, figure: Any) -> Iterator[NDArray[np.uint8]]:
         yield np.asarray(canvas.buffer_rgba()).copy()
 
 
+@dataclass(frozen=True)
+class Film:
+    """How a maneuver is drawn as a film.
+
+    Attributes
+    ----------
+    frames : Number of pictures, equally spaced in time.
+    fps : Pictures a second; a GIF holds whole hundredths of a second a picture.
+    start, end : Part of the record to show [s]; all of it by default.
+    title : Case and database version.
+    """
+
+    frames: int = 200
+    fps: float = 20.0
+    start: float | None = None
+    end: float | None = None
+    title: str = ""
+
+
 def animate(
     simulation: Simulation,
     vehicle: Vehicle,
     waves: Waves | None,
     path: Path,
-    *,
-    frames: int = 200,
-    fps: float = 20.0,
-    title: str = "",
-    start: float | None = None,
-    end: float | None = None,
+    film: Film = Film(),
     each: Callable[[], None] | None = None,
 ) -> Path:
     """Draw a maneuver as a film: GIF, or MP4 where ffmpeg is installed.
@@ -338,10 +352,7 @@ def animate(
     vehicle : Gives silhouette and planes.
     waves : The sea it flew in; None or no component is calm.
     path : File to write; ``.gif`` or ``.mp4``.
-    frames : Number of pictures, equally spaced in time.
-    fps : Pictures a second; a GIF holds whole hundredths of a second a picture.
-    title : Case and database version.
-    start, end : Part of the record to show [s]; all of it by default.
+    film : Pictures, times and title.
     each : Called after each picture, for a progress bar.
 
     Returns
@@ -357,17 +368,17 @@ def animate(
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    writer = writer_of(path, fps)
-    scene = _Scene(sampled(simulation, frames, start, end), simulation, silhouette(vehicle), waves)
+    writer = writer_of(path, film.fps)
+    scene = _Scene(sampled(simulation, film.frames, film.start, film.end), simulation, silhouette(vehicle), waves)
     planes = [p.name for p in vehicle.planes if p.name in simulation.columns]
-    pictures = _pictures(scene, _figure(scene, planes, title, fps))
+    pictures = _pictures(scene, _figure(scene, planes, film.title, film.fps))
     # The film's figure holds each picture as an image: drawing all axes anew takes ten times as long.
-    film = Figure(figsize=_SIZE, dpi=_DPI)
-    FigureCanvasAgg(film)
-    with whole(path) as part, writer.saving(film, str(part), _DPI):
+    screen = Figure(figsize=_SIZE, dpi=_DPI)
+    FigureCanvasAgg(screen)
+    with whole(path) as part, writer.saving(screen, str(part), _DPI):
         for picture in pictures:
-            film.images.clear()
-            film.figimage(picture)
+            screen.images.clear()
+            screen.figimage(picture)
             writer.grab_frame()
             if each is not None:
                 each()

@@ -171,6 +171,12 @@ def calibrate(
         if moved < _CLOSE:
             converged = True
             break
+    return _estimate(task, theta, sigma, threads, converged, rounds)
+
+
+def _estimate(task: Problem, theta: Array, sigma: Array, threads: int, converged: bool, rounds: int) -> Estimate:
+    """The optimum with the covariance of its least-squares problem."""
+    prior = task.prior
     data = jacobian(task, theta, sigma, _STEP * prior, threads)
     information = data.T @ data
     covariance = np.asarray(np.linalg.inv(information + np.diag(1.0 / prior**2)), dtype=np.float64)

@@ -6,6 +6,7 @@ import json
 import os
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -19,9 +20,11 @@ from ident.calibration.problem import Channel, Problem, contradictions, problem
 from ident.calibration.result import Calibrated, Group, Known, LeftOut, Prior, Summary, TrainedSeries
 from ident.calibration.selection import Comparison, compare
 from ident.calibration.sensitivity import sensitivity as what_decides
-from ident.database.lock import WAIT
 from ident.database.store import commit, digest
+from ident.deprecation import gathered
 from ident.estimates.draft import measured_rows
+from ident.options import Diagnostics, Work
+from ident.output import Tell
 from sim.boat.database import NUMBERS, Version, column_order, own_version, read_rows, versions
 from sim.boat.row_codec import correlation_matrix, correlation_texts
 from sim.boat.vehicle import load_vehicle
@@ -248,46 +251,49 @@ def _in_force(solved: Solved) -> tuple[list[Parameter], Estimate]:
     return [*solved.task.chosen, *held], replace(solved.estimate, theta=theta, covariance=covariance)
 
 
+def _told(each: Callable[[str], None]) -> Tell:
+    """The teller that a function of one line of text makes."""
+    return lambda what, done, of: each(what)
+
+
+@gathered(
+    "0.2",
+    {"work": Work, "diagnostics": Diagnostics},
+    wait="work",
+    workers="work",
+    each=("work", "tell", _told),
+    posterior="diagnostics",
+    sensitivity="diagnostics",
+    seed="diagnostics",
+)
 def calibrate(
     name: str | os.PathLike[str],
     db: str | os.PathLike[str] = "coeff_db",
     version: int | None = None,
     message: str = "",
     left_out: bool = True,
-    workers: int | None = None,
-    each: Callable[[str], None] = lambda text: None,
-    wait: float = WAIT,
-    posterior: int = 0,
-    sensitivity: int = 0,
-    seed: int = 0,
+    *,
+    diagnostics: Diagnostics = Diagnostics(),  # noqa: B008  (frozen)
+    work: Work = Work(),  # noqa: B008  (frozen)
 ) -> Calibrated:
     """Estimate multipliers of coefficient groups from free-running maneuvers; commit the result.
 
-    The new version has the captive one as its parent, and covariances of the posterior.
-
     Parameters
     ----------
-    name : Bundled calibration or path to one.
-    db, version : Folder or URL of the database, and captive version; the latest captive one when None.
-    message : Stored with the version.
+    name, db, message : Bundled calibration or path; folder or URL of the database; stored with the version.
+    version : The captive version it starts from; the latest captive one when None.
     left_out : Also calibrate without each source in turn.
-    workers : Threads; the result does not depend on it.
-    each : Called with a line of text as the work goes on.
-    wait : How long to wait for other writers of the database [s].
-    posterior : Also draw the posterior so many times, and hold the draws against the quadratic (extra ``posterior``).
-    sensitivity : Also say which prior decides each channel, by a design of this size, a power of two (extra
-        ``posterior``).
-    seed : Of draws and design.
+    diagnostics, work : What else is computed of the posterior; how long to wait, who is told, how many threads.
 
     Returns
     -------
     Calibrated
+        The new version has the captive one as its parent, and covariances of the posterior.
 
     Raises
     ------
     InputError
-        For a calibration, case, reference, database or version that does not exist or fit, or a package that is
-        not installed.
+        For a calibration, case, reference, database or version that does not exist or fit, or a missing package.
 
     Examples
     --------
@@ -297,22 +303,17 @@ def calibrate(
     >>> done.version, list(done.groups.index)
     (1, ['rudders', 'yaw_damping'])
     """
-    name, db = os.fspath(name), os.fspath(db)
-    if posterior:
+    _refuse_idle(diagnostics, work)
+    if diagnostics.posterior:
         emcee()
-    spec, where, file_digest = load_calibration(name)
+    spec, where, file_digest = load_calibration(os.fspath(name))
     vehicle = load_vehicle(spec.vehicle, beside=where)
-    base = captive_version(db, vehicle.name, version)
-    rows, _ = read_rows(db, base.number, vehicle.name)
+    base = captive_version(os.fspath(db), vehicle.name, version)
+    rows, _ = read_rows(os.fspath(db), base.number, vehicle.name)
     if spec.starts_from == "runs":
         rows = measured_rows(rows)
     every = problem(spec, where, vehicle, rows, parameters(spec, vehicle, rows, where))
-    # Before the search, so that a size which cannot be is refused at once.
-    shares = what_decides(every, sensitivity, seed, workers, each) if sensitivity else None
-    solved = _solved(every, spec.choose, workers, each)
-    task, estimate = solved.task, solved.estimate
-    without = _left_out(task, estimate, workers, each) if left_out else []
-    drawn = sample(task, estimate, posterior, seed, workers, each) if posterior else None
+    solved, learnt = _learnt(every, spec.choose, left_out, diagnostics, work)
     summary = Summary(
         calibration=spec.name,
         vehicle=vehicle.name,
@@ -320,25 +321,56 @@ def calibrate(
         parent_digest=base.digest,
         source=spec.source,
         file_digest=file_digest,
-        trained=list(dict.fromkeys(f"{c.key[0]}:{c.key[1]}" for c in task.channels)),
-        groups=_groups(every, solved),
-        covariance=estimate.covariance.tolist(),
-        series=[
-            TrainedSeries(*key, float(f"{rmse:.4g}"), float(f"{estimate.sigma[key]:.4g}"))
-            for key, rmse in estimate.rms.items()
-        ],
-        left_out=without,
-        warnings=_warnings(task, estimate, without, drawn),
-        evidence={
-            "chosen": float(f"{solved.comparison.log_evidence:.4g}"),
-            "all": float(f"{solved.comparison.every:.4g}"),
-        },
-        sampled=drawn,
-        sensitivity=shares,
+        **learnt,
     )
     done = calibrated_rows(rows, *_in_force(solved))
-    number, new = commit(db, done, _metadata(base, task, summary, message), wait)
+    number, new = commit(os.fspath(db), done, _metadata(base, solved.task, summary, message), work.wait)
     return Calibrated(summary, number, new, digest(done))
+
+
+def _refuse_idle(diagnostics: Diagnostics, work: Work) -> None:
+    """Refuse options that change nothing."""
+    if work.dask is not None:
+        raise InputError(
+            "calibrate, work.dask", repr(work.dask), "workers: a calibration runs in threads of one machine"
+        )
+    if diagnostics.seed is not None and not (diagnostics.posterior or diagnostics.sensitivity):
+        raise InputError("calibrate, diagnostics.seed", f"{diagnostics.seed}", "with posterior or sensitivity")
+
+
+def _learnt(
+    every: Problem, choose: str, left_out: bool, diagnostics: Diagnostics, work: Work
+) -> tuple[Solved, dict[str, Any]]:
+    """The multipliers, and what a summary says of them."""
+
+    def each(text: str) -> None:
+        work.tell(text, 0, 0)
+
+    seed, workers = diagnostics.seed or 0, work.workers
+    # Before the search, so that a size which cannot be is refused at once.
+    size = diagnostics.sensitivity
+    shares = what_decides(every, size, seed, workers, each) if size else None
+    solved = _solved(every, choose, workers, each)
+    task, estimate = solved.task, solved.estimate
+    without = _left_out(task, estimate, workers, each) if left_out else []
+    draws = diagnostics.posterior
+    drawn = sample(task, estimate, draws, seed, workers, each) if draws else None
+    series = [
+        TrainedSeries(*key, float(f"{rmse:.4g}"), float(f"{estimate.sigma[key]:.4g}"))
+        for key, rmse in estimate.rms.items()
+    ]
+    evidence = {"chosen": solved.comparison.log_evidence, "all": solved.comparison.every}
+    return solved, {
+        "trained": list(dict.fromkeys(f"{c.key[0]}:{c.key[1]}" for c in task.channels)),
+        "groups": _groups(every, solved),
+        "covariance": estimate.covariance.tolist(),
+        "series": series,
+        "left_out": without,
+        "warnings": _warnings(task, estimate, without, drawn),
+        "evidence": {which: float(f"{value:.4g}") for which, value in evidence.items()},
+        "sampled": drawn,
+        "sensitivity": shares,
+    }
 
 
 def _warnings(task: Problem, estimate: Estimate, without: list[LeftOut], drawn: Sampled | None) -> list[str]:

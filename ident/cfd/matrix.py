@@ -125,6 +125,18 @@ def write_matrix(
         raise InputError(str(out), "a folder that is not empty", "a new folder, or one that ident plan --cases wrote")
     matrix = read_matrix(out) if is_matrix(out) else Matrix(out)
     planned = _prepared(runs, vehicle, lines, template, matrix, where)
+    _write_folders(planned, template, out, tell)
+    matrix.cases += [one.case for one in planned]
+    matrix.new = [one.case.run_id for one in planned]
+    _write_scripts(out, matrix, template)
+    write_campaign(out, matrix.cases, vehicle, vehicle_file, template)
+    with whole(out / MATRIX) as part:
+        part.write_text(json.dumps(matrix.to_dict(), indent=1) + "\n", encoding="utf-8")
+    return matrix
+
+
+def _write_folders(planned: list[_Written], template: Template, out: Path, tell: Tell) -> None:
+    """A folder for each mesh that is not there yet, and one for every case and grid."""
     meshes: dict[str, Body] = {}
     for one in planned:
         meshes.setdefault(one.case.mesh, one.body)
@@ -142,13 +154,6 @@ def write_matrix(
             wall = wall_cell(template, one.body.length, grid)
             write_case(folder, mesh, one.motion, one.body, template, one.centre, one.speed, wall)
     tell("writing cases", len(planned), len(planned))
-    matrix.cases += [one.case for one in planned]
-    matrix.new = [one.case.run_id for one in planned]
-    _write_scripts(out, matrix, template)
-    write_campaign(out, matrix.cases, vehicle, vehicle_file, template)
-    with whole(out / MATRIX) as part:
-        part.write_text(json.dumps(matrix.to_dict(), indent=1) + "\n", encoding="utf-8")
-    return matrix
 
 
 def _prepared(

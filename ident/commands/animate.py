@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -21,82 +24,61 @@ from ident.text import in_file_name, on_screen
 @click.option("--start", type=float, default=None, help="Time to begin at [s].")
 @click.option("--end", type=float, default=None, help="Time to end at [s].")
 @json_to("Write what was drawn as JSON.")
-def animate(
-    case: str,
-    db: str,
-    version: int | None,
-    vehicle: str | None,
-    out: Path | None,
-    frames: int,
-    fps: float,
-    start: float | None,
-    end: float | None,
-    json_path: str | None,
-) -> None:
+def animate(**options: Any) -> None:
     """Draw a maneuver as an animation: boat, track, depth, pitch, heel and planes.
 
     \b
     Example: ident animate --case hzz20 --db coeff_db --out hzz20.gif
              ident animate --case vzz10-10kt --frames 100 --end 120
     """
-    film(case, db, version, vehicle, out, (frames, fps, start, end), json_path)
+    draw(AnimateOptions(**options))
 
 
-def film(
-    case: str,
-    db: str,
-    version: int | None,
-    vehicle: str | None,
-    out: Path | None,
-    pictures: tuple[int, float, float | None, float | None],
-    json_path: str | None,
-) -> None:
+@dataclass(frozen=True)
+class AnimateOptions:
+    """What `ident animate` was asked: a case as of `ident validate`, a file, and which pictures."""
+
+    case: str
+    db: str
+    version: int | None
+    vehicle: str | None
+    out: Path | None
+    frames: int
+    fps: float
+    start: float | None
+    end: float | None
+    json_path: str | None
+
+
+def draw(asked: AnimateOptions) -> None:
     """Fly a case as ``ident validate`` does, draw it with a progress bar, and say what was drawn.
-
-    Parameters
-    ----------
-    case, db, version, vehicle : As for ``ident.validate``.
-    out : File; the case's name as GIF when None.
-    pictures : Number of frames, frames a second, start and end [s] or None.
-    json_path : Where to write what was drawn as JSON, ``-`` for standard output.
 
     Raises
     ------
     InputError
-        As ``validate`` and ``animate``.
+        As ``validate`` and ``ident.animation.film.animate``.
     """
     from rich.progress import Progress
 
     import ident
-    from ident.animation.film import animate as draw
-    from ident.animation.film import writer_of
+    from ident.animation.film import Film, writer_of
+    from ident.animation.film import animate as as_film
     from sim.boat.database import version_words
 
-    frames, fps, start, end = pictures
-    console = console_for(quiet=json_path == "-")
-    if out is not None:
-        writer_of(out, fps)
-    with equilibrium_of(case), console.status("flying the case"):
-        done = ident.validate(case, db, version, vehicle=vehicle)
-    database = done.database
-    title = f"{done.case.title}, {done.case.vehicle}; {version_words(database)}"
-    path = out or Path(f"{in_file_name(done.case.name)}.gif")
+    console = console_for(quiet=asked.json_path == "-")
+    if asked.out is not None:
+        writer_of(asked.out, asked.fps)
+    with equilibrium_of(asked.case), console.status("flying the case"):
+        done = ident.validate(asked.case, asked.db, asked.version, vehicle=asked.vehicle)
+    title = f"{done.case.title}, {done.case.vehicle}; {version_words(done.database)}"
+    path = asked.out or Path(f"{in_file_name(done.case.name)}.gif")
+    film = Film(asked.frames, asked.fps, asked.start, asked.end, title)
     with Progress(console=console, transient=True) as progress:
-        task = progress.add_task("drawing", total=frames)
-        draw(
-            done.simulation,
-            done.boat.vehicle,
-            done.simulation.waves,
-            path,
-            frames=frames,
-            fps=fps,
-            title=title,
-            start=start,
-            end=end,
-            each=lambda: progress.advance(task),
-        )
+        task = progress.add_task("drawing", total=film.frames)
+        each = partial(progress.advance, task)
+        as_film(done.simulation, done.boat.vehicle, done.simulation.waves, path, film, each)
     size = path.stat().st_size
-    console.print(f"animation: {on_screen(path)}, {frames} frames, {size / 1e6:.2g} MB", highlight=False)
-    if json_path:
-        shown = {"case": done.case.name, "database": database, "file": str(path), "frames": frames, "fps": fps}
-        emit(shown | {"bytes": size}, json_path)
+    console.print(f"animation: {on_screen(path)}, {film.frames} frames, {size / 1e6:.2g} MB", highlight=False)
+    if asked.json_path:
+        shown = {"case": done.case.name, "database": done.database, "file": str(path)}
+        emit(shown | {"frames": film.frames, "fps": film.fps, "bytes": size}, asked.json_path)

@@ -3,12 +3,57 @@
 from __future__ import annotations
 
 import sys
+from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from ident.commands.shared import DB, MESSAGE, OUT, WAIT, console_for, emit, json_to, out_file, told
 from ident.text import on_screen
+
+if TYPE_CHECKING:
+    from ident.cfd.batch import Batch
+    from ident.planning.matrix import Plan
+
+
+@dataclass(frozen=True)
+class FitOptions:
+    """What `ident fit` was asked."""
+
+    folder: Path
+    db: str
+    message: str
+    json_path: str | None
+    force: str
+    wait: float
+    measured_only: bool
+    without: tuple[str, ...]
+    dask: str | None
+
+
+@dataclass(frozen=True)
+class PlanOptions:
+    """What `ident plan` was asked: a matrix, or also the CFD cases of it."""
+
+    folder: Path
+    cases_folder: Path | None
+    target_rel: float
+    facility: Path | None
+    cases: str | None
+    surface: Path | None
+    template: Path | None
+    out: Path | None
+    json_path: str | None
+
+    def check(self) -> None:
+        """Refuse options that do not go together. Raises ``click.UsageError``."""
+        of_cases = {"OUT": self.cases_folder, "--surface": self.surface, "--template": self.template}
+        if self.cases is not None and not all(of_cases.values()):
+            raise click.UsageError("--cases openfoam needs --surface FILE, --template FILE and a folder OUT")
+        for name, value in of_cases.items():
+            if self.cases is None and value is not None:
+                raise click.UsageError(f"{name} is for --cases openfoam, which is not given")
 
 
 @click.command()
@@ -25,17 +70,7 @@ from ident.text import on_screen
 @click.option("--measured-only", is_flag=True, help="What the runs give, without any estimate.")
 @click.option("--without", multiple=True, metavar="ESTIMATE", help="Leave a named estimate out; may be repeated.")
 @click.option("--dask", default=None, metavar="ADDRESS", help="Read, reduce and solve on a Dask cluster.")
-def fit(
-    folder: Path,
-    db: str,
-    message: str,
-    json_path: str | None,
-    force: str,
-    wait: float,
-    measured_only: bool,
-    without: tuple[str, ...],
-    dask: str | None,
-) -> None:
+def fit(**options: Any) -> None:
     """Identify the coefficients of a campaign and commit one database version.
 
     FOLDER holds campaign.toml and one CSV a test, or such folders. Nothing is committed while ident check
@@ -49,13 +84,22 @@ def fit(
     import ident
     from ident.fitting.fit import show
 
-    console = console_for(quiet=json_path == "-")
+    asked = FitOptions(**options)
+    console = console_for(quiet=asked.json_path == "-")
     with told() as tell:
-        done = ident.fit(folder, db, message, force, wait, tell, measured_only, without, dask)
+        done = ident.fit(
+            asked.folder,
+            asked.db,
+            asked.message,
+            asked.force,
+            measured_only=asked.measured_only,
+            without=asked.without,
+            work=ident.Work(asked.wait, tell, asked.dask),
+        )
     for one in done:
         show(one, console)
-    if json_path:
-        emit(done.to_dict(), json_path)
+    if asked.json_path:
+        emit(done.to_dict(), asked.json_path)
 
 
 @click.command()
@@ -93,17 +137,7 @@ def check(folder: Path, json_path: str | None, strict: bool, everything: bool) -
 @click.option("--template", type=click.Path(path_type=Path), default=None, help="With --cases: TOML file of settings.")
 @out_file("Write the test matrix as CSV.")
 @json_to("Write terms and runs as JSON.")
-def plan(
-    folder: Path,
-    cases_folder: Path | None,
-    target_rel: float,
-    facility: Path | None,
-    cases: str | None,
-    surface: Path | None,
-    template: Path | None,
-    out: Path | None,
-    json_path: str | None,
-) -> None:
+def plan(**options: Any) -> None:
     """Plan the fewest runs that give every term of the vehicle a wanted standard error.
 
     With --cases, each becomes a case folder in OUT that OpenFOAM runs as it is, beside a campaign.toml that reads
@@ -113,38 +147,43 @@ def plan(
     Example: ident plan raw_captive_data/bb2 --target-rel 0.1 --out plan.csv
              ident plan lines/captive --cases openfoam --surface hull.stl --template template.toml cases/
     """
-    import ident
     from ident.planning.matrix import show
 
-    console = console_for(quiet=json_path == "-")
-    if cases is None:
-        _no_idle_options({"OUT": cases_folder, "--surface": surface, "--template": template})
-        with console.status("identifying, choosing runs, identifying again with them"):
-            made = ident.plan(folder, target_rel, facility)
-        answer = made.to_dict()
-    else:
-        if cases_folder is None or surface is None or template is None:
-            raise click.UsageError("--cases openfoam needs --surface FILE, --template FILE and a folder OUT")
+    asked = PlanOptions(**options)
+    asked.check()
+    console = console_for(quiet=asked.json_path == "-")
+    batch = _cases(asked) if asked.cases else None
+    made = _matrix(asked, console) if batch is None else batch.plan
+    show(made, console)
+    if batch is not None:
         from ident.cfd.screen import show_batch
 
-        with told() as tell:
-            batch = ident.plan_cases(folder, surface, template, cases_folder, target_rel, facility, tell)
-        made, answer = batch.plan, batch.to_dict()
-    show(made, console)
-    if cases is not None:
         show_batch(batch, console)
-    if out:
-        made.to_csv(out)
-        console.print(f"test matrix: {on_screen(out)}", highlight=False)
-    if json_path:
-        emit(answer, json_path)
+    if asked.out:
+        made.to_csv(asked.out)
+        console.print(f"test matrix: {on_screen(asked.out)}", highlight=False)
+    if asked.json_path:
+        emit(made.to_dict() if batch is None else batch.to_dict(), asked.json_path)
 
 
-def _no_idle_options(given: dict[str, Path | None]) -> None:
-    """What only --cases looks at is refused without it."""
-    for name, value in given.items():
-        if value is not None:
-            raise click.UsageError(f"{name} is for --cases openfoam, which is not given")
+def _matrix(asked: PlanOptions, console: Any) -> Plan:
+    import ident
+
+    with console.status("identifying, choosing runs, identifying again with them"):
+        return ident.plan(asked.folder, asked.target_rel, asked.facility)
+
+
+def _cases(asked: PlanOptions) -> Batch:
+    """The runs of the plan written as CFD cases."""
+    import ident
+
+    assert asked.surface is not None
+    assert asked.template is not None
+    assert asked.cases_folder is not None
+    with told() as tell:
+        return ident.plan_cases(
+            asked.folder, asked.surface, asked.template, asked.cases_folder, asked.target_rel, asked.facility, tell
+        )
 
 
 @click.command()

@@ -2,12 +2,38 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import click
 
 from ident.commands.shared import DB, VERSION, console_for, emit, equilibrium_of, json_to, out_file
 from ident.text import on_screen
+
+
+@dataclass(frozen=True)
+class FlyOptions:
+    """What `ident fly` was asked."""
+
+    case: str
+    vehicle: str | None
+    db: str
+    version: int | None
+    out: Path | None
+    every: float | None
+    loads: str | None
+    samples: int | None
+    seed: int | None
+    quantiles: str | None
+    json_path: str | None
+
+    def check(self) -> None:
+        """Refuse options that do not go together. Raises ``click.UsageError``."""
+        if self.samples and self.loads:
+            raise click.UsageError("--loads goes with one flight, without --samples")
+        if not self.samples and (self.quantiles or self.seed is not None):
+            raise click.UsageError("--quantiles and --seed go with --samples")
 
 
 @click.command()
@@ -27,19 +53,7 @@ from ident.text import on_screen
 @click.option("--seed", type=click.IntRange(min=0), default=None, help="With --samples: seed of the draws, 0 without.")
 @click.option("--quantiles", default=None, metavar="Q,Q,...", help="With --samples: curves at these shares, 0 to 1.")
 @json_to("Write what was flown as JSON.")
-def fly(
-    case: str,
-    vehicle: str | None,
-    db: str,
-    version: int | None,
-    out: Path | None,
-    every: float | None,
-    loads: str | None,
-    samples: int | None,
-    seed: int | None,
-    quantiles: str | None,
-    json_path: str | None,
-) -> None:
+def fly(**options: Any) -> None:
     """Fly a maneuver and write its history: states, planes, commands, flow angles, surface.
 
     Program frame, SI and radians, every digit.
@@ -50,18 +64,26 @@ def fly(
              ident fly --case hzz20 --loads part --out loads.parquet
              ident fly --case hzz20 --samples 200 --quantiles 0.025,0.5,0.975 --out band.nc
     """
-    if samples and loads:
-        raise click.UsageError("--loads goes with one flight, without --samples")
-    if not samples and (quantiles or seed is not None):
-        raise click.UsageError("--quantiles and --seed go with --samples")
-    from ident.exports.fly import fly_to_file
+    asked = FlyOptions(**options)
+    asked.check()
+    from ident.exports.fly import Draws, fly_to_file
 
-    console = console_for(quiet=json_path == "-")
-    with equilibrium_of(case), console.status("flying the case"):
-        done = fly_to_file(case, db, version, vehicle, out, every, samples, seed or 0, _shares(quantiles), loads)
-    console.print(f"history: {on_screen(done['file'])}, {done['records']} records", highlight=False)
-    if json_path:
-        emit(done, json_path)
+    draws = Draws(asked.samples, asked.seed or 0, _shares(asked.quantiles)) if asked.samples else None
+    console = console_for(quiet=asked.json_path == "-")
+    with equilibrium_of(asked.case), console.status("flying the case"):
+        written = fly_to_file(
+            asked.case,
+            asked.db,
+            asked.version,
+            asked.vehicle,
+            asked.out,
+            every=asked.every,
+            draws=draws,
+            loads=asked.loads,
+        )
+    console.print(f"history: {on_screen(written.file)}, {written.records} records", highlight=False)
+    if asked.json_path:
+        emit(written.to_dict(), asked.json_path)
 
 
 def _shares(text: str | None) -> tuple[float, ...]:

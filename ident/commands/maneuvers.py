@@ -50,7 +50,11 @@ class ValidateOptions:
 
     def of_one_case(self) -> dict[str, Any]:
         """What goes with a single case only, as ``ident.validate`` takes it."""
-        return {name: getattr(self, name) for name in _OF_ONE_CASE}
+        from ident.options import Conditions, OwnReference
+
+        own = OwnReference(self.reference, self.frame, self.trial) if self.reference is not None else None
+        conditions = Conditions(self.speed, self.depth, self.angle)
+        return {"vehicle": self.vehicle, "reference": own, "conditions": conditions}
 
     def check(self) -> None:
         """Refuse options that do not go together. Raises ``click.UsageError``."""
@@ -58,7 +62,7 @@ class ValidateOptions:
         for wrong, text in (
             (self.case == "", "--case is empty; give the name of a case or the path of a case file"),
             ((self.case is None) == (not self.every), "give either --case NAME or --all"),
-            (self.every and any(self.of_one_case().values()), f"{alone} go with --case"),
+            (self.every and any(getattr(self, name) for name in _OF_ONE_CASE), f"{alone} go with --case"),
             (self.loads and self.every, "--loads goes with --case"),
             (self.cases and not self.every, "--cases goes with --all"),
             (self.dask and not self.samples, "--dask goes with --samples"),
@@ -67,6 +71,27 @@ class ValidateOptions:
         ):
             if wrong:
                 raise click.UsageError(text)
+
+
+@dataclass(frozen=True)
+class CalibrateOptions:
+    """What `ident calibrate` was asked."""
+
+    name: str
+    db: str
+    version: int | None
+    message: str
+    left_out: bool
+    posterior: int | None
+    sensitivity: int | None
+    seed: int | None
+    json_path: str | None
+    wait: float
+
+    def check(self) -> None:
+        """Refuse options that do not go together. Raises ``click.UsageError``."""
+        if self.seed is not None and not (self.posterior or self.sensitivity):
+            raise click.UsageError("--seed goes with --posterior or --sensitivity")
 
 
 @click.command()
@@ -273,18 +298,7 @@ def _all(asked: ValidateOptions, console: Any) -> Scoreboard:
 @click.option("--seed", type=click.IntRange(0, 2**32 - 1), default=None, help="Of --posterior and --sensitivity; 0.")
 @json_to("Write priors, posteriors and diagnostics.")
 @WAIT
-def calibrate(
-    name: str,
-    db: str,
-    version: int | None,
-    message: str,
-    left_out: bool,
-    posterior: int | None,
-    sensitivity: int | None,
-    seed: int | None,
-    json_path: str | None,
-    wait: float,
-) -> None:
+def calibrate(**options: Any) -> None:
     """Estimate multipliers of coefficient groups from free-running maneuvers.
 
     NAME is a bundled calibration or a path to a file. Commits a new version whose parent is the
@@ -299,25 +313,24 @@ def calibrate(
     import ident
     from ident.calibration.result import show
 
-    if seed is not None and not (posterior or sensitivity):
-        raise click.UsageError("--seed goes with --posterior or --sensitivity")
-    console = console_for(quiet=json_path == "-")
+    asked = CalibrateOptions(**options)
+    asked.check()
+    console = console_for(quiet=asked.json_path == "-")
     with console.status("calibrating") as status:
+        work = ident.Work(asked.wait, lambda what, done, of: status.update(on_screen(what)))
+        diagnostics = ident.Diagnostics(asked.posterior or 0, asked.sensitivity or 0, asked.seed)
         done = ident.calibrate(
-            name,
-            db,
-            version,
-            message,
-            left_out,
-            each=lambda text: status.update(on_screen(text)),
-            wait=wait,
-            posterior=posterior or 0,
-            sensitivity=sensitivity or 0,
-            seed=seed or 0,
+            asked.name,
+            asked.db,
+            asked.version,
+            asked.message,
+            asked.left_out,
+            diagnostics=diagnostics,
+            work=work,
         )
     show(done, console)
-    if json_path:
-        emit(done.to_dict(), json_path)
+    if asked.json_path:
+        emit(done.to_dict(), asked.json_path)
 
 
 @click.command()

@@ -11,14 +11,12 @@ from collections.abc import Iterator
 from datetime import UTC, datetime
 from pathlib import Path
 
+from ident.options import WAIT
 from sim.files.errors import InputError
 
 LOCK = ".lock"
 # Who holds the lock; the lock's own file is emptied by everyone who tries it.
 OWNER = ".lock.owner"
-# How long a writer waits for another [s].
-WAIT = 60.0
-
 
 _log = logging.getLogger(__name__)
 

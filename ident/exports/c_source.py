@@ -214,7 +214,7 @@ def _translated(parts: _Parts, rows: int, columns: int) -> tuple[Translation, di
     wanted: dict[str, tuple[Any, str]] = {
         "hold": (maneuver.hold, "flight around rate dt steps start"),
         "hold_for": (maneuver.hold_for, "flight around rate left h start"),
-        "run": (maneuver.run, "flight around log dt steps every start_zero"),
+        "run": (maneuver.integrate, "flight around log dt steps every start_zero"),
         "fill_rate": (fill_rate, "m w y c near s k dy"),
     }
     if parts.around:

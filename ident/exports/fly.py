@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
@@ -16,12 +17,53 @@ from ident.exports.history import (
 )
 from ident.output import whole
 from ident.validation.bands import fly_samples
-from ident.validation.boats import Fleet
+from ident.validation.boats import Boat, Fleet
 from ident.validation.loads import loads_by_part
 from sim.boat.vehicle import load_vehicle
 from sim.files.errors import InputError
-from sim.flight.case import load_case
+from sim.flight.case import Case, load_case
 from sim.flight.simulate import fly
+
+
+@dataclass(frozen=True)
+class Draws:
+    """Coefficient sets drawn from the errors of a version.
+
+    Attributes
+    ----------
+    samples, seed : How many, and the seed of the generator.
+    quantiles : Shares, 0 to 1, whose curves are written instead of every flight; see ``samples_dataset``.
+    """
+
+    samples: int
+    seed: int = 0
+    quantiles: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True)
+class Written:
+    """A flight written to a file.
+
+    Attributes
+    ----------
+    file, case, vehicle : Where, and what was flown.
+    database : ``path``, ``version`` and ``digest``.
+    records : Number of times.
+    ends_s : End of the flight [s].
+    samples : Number of coefficient sets; None for the version itself.
+    """
+
+    file: str
+    case: str
+    vehicle: str
+    database: dict[str, Any]
+    records: int
+    ends_s: float
+    samples: int | None = None
+
+    def to_dict(self) -> dict[str, Any]:
+        """For a program to read; without ``samples`` where there are none."""
+        return {f.name: value for f in fields(self) if (value := getattr(self, f.name)) is not None}
 
 
 def fly_to_file(
@@ -30,12 +72,11 @@ def fly_to_file(
     version: int | None = None,
     vehicle_name: str | None = None,
     out: Path | None = None,
+    *,
     every: float | None = None,
-    samples: int | None = None,
-    seed: int = 0,
-    quantiles: tuple[float, ...] = (),
+    draws: Draws | None = None,
     loads: str | None = None,
-) -> dict[str, Any]:
+) -> Written:
     """Fly a case and write its history.
 
     Parameters
@@ -45,12 +86,8 @@ def fly_to_file(
     vehicle_name : Bundled vehicle or path to a vehicle file, instead of the case's.
     out : ``.csv``, ``.parquet`` or ``.nc``; named after case and version when None.
     every : Time between records [s], as the case says when None.
+    draws : Flights of drawn coefficient sets instead, to ``.nc``.
     loads : ``part`` or ``coefficient``: loads on the boat from each of them beside the motion, see ``with_loads``.
-    samples, seed, quantiles : Coefficient sets drawn from the errors, to ``.nc``; see ``samples_dataset``.
-
-    Returns
-    -------
-    ``file``, case, vehicle, version and digest, ``records`` and the end of the run ``ends_s``.
 
     Raises
     ------
@@ -63,29 +100,42 @@ def fly_to_file(
     case, where = load_case(name)
     case = sampled(case, every)
     vehicle = load_vehicle(vehicle_name) if vehicle_name else load_vehicle(case.vehicle, beside=where)
-    fleet = Fleet(db, version)
-    boat = fleet.boat(vehicle)
+    boat = Fleet(db, version).boat(vehicle)
     database = {"path": db, "version": boat.commit.number, "digest": boat.commit.digest}
-    path = out or Path(f"{case.name}_v{database['version']}{'.nc' if samples else '.csv'}")
+    path = out or Path(f"{case.name}_v{database['version']}{'.nc' if draws else '.csv'}")
     check_history_file(path)
-    if samples and path.suffix != ".nc":
-        raise InputError(str(path), f"{samples} samples", "a .nc file, which has a dimension for them")
-    said = {"file": str(path), "case": case.name, "vehicle": vehicle.name, "database": database}
+    if draws and path.suffix != ".nc":
+        raise InputError(str(path), f"{draws.samples} samples", "a .nc file, which has a dimension for them")
     attributes = flight_attributes(case, vehicle.name, database)
-    if samples:
-        bands = fly_samples(case, vehicle, boat.rows, samples, seed)
-        with whole(path) as part:
-            data = samples_dataset(bands, attributes, quantiles)
-            data.to_netcdf(part, engine="scipy", format="NETCDF3_64BIT")
-        return said | {"records": len(bands.time), "ends_s": float(bands.time[-1]), "samples": len(bands.draws)}
-    simulation = fly(case, vehicle, boat.model(case), boat.water(case))
-    history = history_of(simulation, vehicle, attributes)
+    if draws:
+        records, ends, samples = _write_samples(case, boat, draws, attributes, path)
+        return Written(str(path), case.name, vehicle.name, database, records, ends, samples)
+    return Written(str(path), case.name, vehicle.name, database, *_write_flight(case, boat, loads, attributes, path))
+
+
+def _write_samples(
+    case: Case, boat: Boat, draws: Draws, attributes: dict[str, str], path: Path
+) -> tuple[int, float, int]:
+    """Flights of drawn sets; number of times, their end [s] and the number of sets that fly."""
+    bands = fly_samples(case, boat.vehicle, boat.rows, draws.samples, draws.seed)
+    with whole(path) as part:
+        data = samples_dataset(bands, attributes, draws.quantiles)
+        data.to_netcdf(part, engine="scipy", format="NETCDF3_64BIT")
+    return len(bands.time), float(bands.time[-1]), len(bands.draws)
+
+
+def _write_flight(
+    case: Case, boat: Boat, loads: str | None, attributes: dict[str, str], path: Path
+) -> tuple[int, float]:
+    """One flight; number of records and its end [s]."""
+    simulation = fly(case, boat.vehicle, boat.model(case), boat.water(case))
+    history = history_of(simulation, boat.vehicle, attributes)
     if loads:
         history = with_loads(history, loads_by_part(case, boat, simulation, loads))
     if not all(map(_finite, history.values.values())):
         raise InputError(f"case {case.name}", f"not finite after {simulation['t'][-1]:.1f} s", "a flight that holds")
     write_history(history, path)
-    return said | {"records": len(history.values["t"]), "ends_s": float(simulation.end[0])}
+    return len(history.values["t"]), float(simulation.end[0])
 
 
 def _finite(values: Any) -> bool:

@@ -17,14 +17,15 @@ from ident.captive.combine import by_vehicle
 from ident.checks.check import check_campaign, refuse_errors
 from ident.checks.findings import SEVERITIES, Finding
 from ident.cluster import cluster
-from ident.database.lock import WAIT
 from ident.database.provenance import conversions, run_sources
 from ident.database.store import commit, database_rows, digest, no_rows
+from ident.deprecation import gathered
 from ident.estimates.predict import Estimated, predicted
 from ident.estimates.turning import Given, Shared
 from ident.fitting.summary import summary
 from ident.identification.identify import Identification, identify
-from ident.output import Results, Tell, html_table, silent
+from ident.options import Work
+from ident.output import Results, html_table
 from ident.text import on_screen
 from sim.files.errors import InputError
 
@@ -166,61 +167,49 @@ def metadata(
     )
 
 
+@gathered("0.2", {"work": Work}, wait="work", tell="work", dask="work")
 def fit(
     folder: str | os.PathLike[str],
     db: str | os.PathLike[str] = "coeff_db",
     message: str = "",
     force: str = "",
-    wait: float = WAIT,
-    tell: Tell = silent,
+    *,
     measured_only: bool = False,
     without: Collection[str] = (),
-    dask: str | None = None,
+    work: Work = Work(),  # noqa: B008  (frozen)
 ) -> Results[Fit]:
     """Identify the coefficients of every campaign at or below a folder; commit one version each.
 
-    Runs are turned to the program frame (x forward, y starboard, z down), made dimensionless and
-    decoupled in order, with the errors of what was subtracted. Either every campaign can be read
-    and identified, or nothing is committed.
-
-    What the runs do not say, named estimates do (``ident.estimates``): they are part of the version, and
-    every row that one has touched names it.
+    Runs are turned to the program frame (x forward, y starboard, z down), made dimensionless and decoupled in order,
+    with the errors of what was subtracted [1]_ [2]_ [3]_. What they do not say, named estimates do
+    (``ident.estimates``): a row names its own. Either every campaign can be fitted, or nothing is committed.
 
     Parameters
     ----------
     folder : Campaign folder, or a folder of campaign folders.
     db : Folder or object-store URL of the database; made when there is none.
     message : Stored with the version.
-    force : Why a campaign is fitted although a quality check finds an error; stored with the version.
-        Empty to refuse it.
-    wait : How long to wait for other writers of the database [s].
-    tell : Told what is done, how much of it, and of how much.
+    force : Why a campaign is fitted although a check finds an error, stored with the version; empty to refuse it.
     measured_only : Leave all estimates out.
     without : Names of estimates to leave out.
-    dask : Address of a Dask scheduler whose workers, which see the same folders, read the files, reduce their
-        histories and solve the blocks of unknowns; the result is that of this machine alone.
+    work : How long to wait, who is told, and on which machines; the result does not depend on it.
 
     Returns
     -------
     Results of Fit
-        One a vehicle, in folder order: several campaigns of one are fitted together, with the error
-        between their facilities that they show.
+        One a vehicle, in folder order: campaigns of one are fitted together, with the error between facilities.
 
     Raises
     ------
     InputError
-        For bad input in any campaign or an error that a check finds, before anything is committed;
-        for a reason where no check finds an error.
+        For bad input or an error of a check, before anything is committed; for a reason where there is no error.
 
     References
     ----------
-    .. [1] Gertler, M., Hagen, G. R., "Standard equations of motion for submarine simulation",
-       NSRDC Report 2510, 1967.
-    .. [2] Feldman, J., "DTNSRDC revised standard submarine equations of motion",
-       DTNSRDC/SPD-0393-09, 1979.
-    .. [3] Kim, Y., "Development and Validation of Hydrodynamic Model for Near Free Surface
-       Maneuvers of BB2 Joubert Generic Submarine", PhD thesis, University of Iowa, 2021,
-       doi 10.17077/etd.005772, Eqs. (17)-(31).
+    .. [1] Gertler, M., Hagen, G. R., "Standard equations of motion for submarine simulation", NSRDC Report 2510, 1967.
+    .. [2] Feldman, J., "DTNSRDC revised standard submarine equations of motion", DTNSRDC/SPD-0393-09, 1979.
+    .. [3] Kim, Y., "Development and Validation of Hydrodynamic Model for Near Free Surface Maneuvers of BB2 Joubert
+       Generic Submarine", PhD thesis, University of Iowa, 2021, doi 10.17077/etd.005772, Eqs. (17)-(31).
 
     Examples
     --------
@@ -229,12 +218,44 @@ def fit(
     ...     print(done.campaign.vehicle.name, done.version, len(done.rows))
     my-boat 0 59
     """
-    path_of_db = os.fspath(db)
-    paths = find_campaigns(Path(folder))
-    with cluster(dask) as spread:
-        read, paths = by_vehicle([read_campaign(path, tell=tell, spread=spread) for path in paths], paths)
-        identified = [identify(campaign, tell, spread) for campaign in read]
-    checked = [check_campaign(*one, tell) for one in zip(read, paths, identified, strict=True)]
+    ready = _ready(Path(folder), force, measured_only, without, work)
+    done = []
+    for one, findings, rows, estimates in ready:
+        said = metadata(one.campaign, one, message, findings, estimates, force)
+        version, new = commit(os.fspath(db), rows, said, work.wait)
+        done.append(Fit(one.campaign, one, rows, version, new, digest(rows), findings, estimates))
+        _log_fit(done[-1])
+    return Results(done)
+
+
+def _ready(
+    folder: Path, force: str, measured_only: bool, without: Collection[str], work: Work
+) -> list[tuple[Identification, list[Finding], pd.DataFrame, list[Estimated]]]:
+    """Every campaign identified and checked, its rows, and what became of each estimate."""
+    if work.workers is not None:
+        raise InputError("fit, work.workers", f"{work.workers}", "dask: threads are of calibrate")
+    checked = _checked(folder, force, work)
+    ready = [(one, findings, *_rows(one, measured_only, without)) for one, findings in checked]
+    for one, _, rows, _ in ready:
+        if rows.empty:
+            nothing = "no run, and no estimate that works without"
+            raise InputError(one.campaign.header.name, nothing, "runs, or a vehicle whose geometry file has a hull")
+    return ready
+
+
+def _log_fit(done: Fit) -> None:
+    applied = " ".join(e.name for e in done.estimates if e.applied)
+    said = {"campaign": done.campaign.header.name, "version": done.version, "estimates": applied}
+    _log.info("campaign fitted", extra=said)
+
+
+def _checked(folder: Path, force: str, work: Work) -> list[tuple[Identification, list[Finding]]]:
+    """Every campaign read, identified and checked; an error that a check finds is refused without a reason."""
+    paths = find_campaigns(folder)
+    with cluster(work.dask) as spread:
+        read, paths = by_vehicle([read_campaign(path, tell=work.tell, spread=spread) for path in paths], paths)
+        identified = [identify(campaign, work.tell, spread) for campaign in read]
+    checked = [check_campaign(*one, work.tell) for one in zip(read, paths, identified, strict=True)]
     for one, findings in zip(identified, checked, strict=True):
         _log_checks(one.campaign, findings)
     if not force.strip():
@@ -242,22 +263,13 @@ def fit(
             refuse_errors(path, findings)
     elif not any(f.severity == "error" for findings in checked for f in findings):
         raise InputError("--force", repr(force[:60]), "nothing: no check finds an error")
-    ready = [(one.campaign, one, _measured(one.campaign, one, measured_only)) for one in identified]
-    whole = [
-        (rows, []) if measured_only else predicted(campaign.vehicle, rows, given_of(campaign), without)
-        for campaign, _, rows in ready
-    ]
-    for (campaign, _, _), (rows, _) in zip(ready, whole, strict=True):
-        if rows.empty:
-            nothing = "no run, and no estimate that works without"
-            raise InputError(campaign.header.name, nothing, "runs, or a vehicle whose geometry file has a hull")
-    done: list[Fit] = []
-    for (campaign, one, _), (rows, estimates), findings in zip(ready, whole, checked, strict=True):
-        version, new = commit(path_of_db, rows, metadata(campaign, one, message, findings, estimates, force), wait)
-        applied = " ".join(e.name for e in estimates if e.applied)
-        _log.info("campaign fitted", extra={"campaign": campaign.header.name, "version": version, "estimates": applied})
-        done.append(Fit(campaign, one, rows, version, new, digest(rows), findings, estimates))
-    return Results(done)
+    return list(zip(identified, checked, strict=True))
+
+
+def _rows(one: Identification, measured_only: bool, without: Collection[str]) -> tuple[pd.DataFrame, list[Estimated]]:
+    """Database rows of a campaign, and what became of each estimate."""
+    rows = _measured(one.campaign, one, measured_only)
+    return (rows, []) if measured_only else predicted(one.campaign.vehicle, rows, given_of(one.campaign), without)
 
 
 def _log_checks(campaign: Campaign, findings: list[Finding]) -> None:

@@ -221,6 +221,14 @@ def _crossings(time: Array, values: Array, drift: int, channel: str) -> int:
     return crossings
 
 
+def _after_the_start(
+    time: Array, values: Array, drift: int, blocks: float, step: float
+) -> tuple[NDArray[np.bool_], bool]:
+    """Samples after the start-up, and whether there is one."""
+    whole = _fit(time, values, _with_one(drift_columns(float(time[0]), float(time[-1]), drift)), blocks, cut=True)
+    return (time >= whole.start - 0.5 * step if whole.cut else np.ones(time.size, dtype=bool)), whole.cut
+
+
 def statistics_of(
     time: Array,
     values: Array,
@@ -233,8 +241,7 @@ def statistics_of(
 
     Parameters
     ----------
-    time : (n,) equally spaced [s].
-    values : (n,).
+    time, values : (n,) equally spaced [s], and (n,).
     channel, unit : Names for the result.
     drift : Order of the polynomial taken off as slow drift; 0 takes off the mean alone.
     resolution : As in ``spectrum``.
@@ -242,15 +249,13 @@ def statistics_of(
     Raises
     ------
     InputError
-        For unequal steps, values that are not finite, a channel that does not move, or fewer
-        than ten zero crossings.
+        For unequal steps, values that are not finite, a channel at rest, or fewer than ten zero crossings.
     """
     step = uniform_step(time)
     if not np.isfinite(values).all():
         raise InputError(f"statistics of {channel}", "values that are not finite", "finite numbers")
     blocks = _BLOCKS * _crossings(time, values, drift, channel)
-    whole = _fit(time, values, _with_one(drift_columns(float(time[0]), float(time[-1]), drift)), blocks, cut=True)
-    use = time >= whole.start - 0.5 * step if whole.cut else np.ones(time.size, dtype=bool)
+    use, cut = _after_the_start(time, values, drift, blocks, step)
     t, y = time[use], values[use]
     regressors = _with_one(drift_columns(float(t[0]), float(t[-1]), drift))
     fit = _fit(t, y, regressors, blocks, cut=False)
@@ -267,7 +272,7 @@ def statistics_of(
         unit=unit,
         start=float(t[0]),
         end=float(t[-1]),
-        cut=whole.cut,
+        cut=cut,
         mean=float(fit.values[0, 0]),
         mean_stderr=math.sqrt(max(float(fit.covariance[0, 0, 0]), 0.0)),
         drift=float(trend[-1] - trend[0]),

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from datetime import UTC, datetime
 from importlib.resources import files
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
@@ -33,6 +33,9 @@ from sim.boat.vehicle import Vehicle, load_vehicle
 from sim.files.errors import InputError
 from sim.files.frames import PROGRAM
 from sim.files.toml_files import bundled
+
+if TYPE_CHECKING:
+    from jinja2 import Template
 
 # Prime derivatives do not depend on density and gravity, so both may be anything.
 _UNIT = Environment(density=1.0, gravity=0.0)
@@ -324,17 +327,9 @@ def write_report(
         When database, version or vehicle do not exist, the scoreboard is of another version, or the page cannot be
         written.
     """
-    from jinja2 import Environment as Templates
-    from jinja2 import PackageLoader, StrictUndefined
-
     boat = load_vehicle(vehicle)
     rows, number = read_rows(db, version, boat.name)
     rows = rows.reset_index(drop=True)
-    loader = PackageLoader("ident", "report")
-    templates = Templates(
-        loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
-    )
-    templates.filters |= {"spans": spans, "term_anchor": term_anchor, "plain": _figure}
     commit = own_version(db, boat.name, number)
     path = Path(out) / f"{re.sub(r'[^A-Za-z0-9._-]', '_', boat.name)}_v{number}.html"
     page_of_figures = path.with_name(f"{path.stem}_interactive.html")
@@ -345,15 +340,37 @@ def write_report(
         "interactive": page_of_figures.name if interactive else "",
         "score": read_score(scoreboard, commit.digest, len(rows)) if scoreboard else None,
     }
-    page = templates.get_template("report.html.j2").render(content)
+    page = _template().render(content)
     with whole(path) as part:
         part.write_text(page, encoding="utf-8")
-    return {
+    said = {
         "file": str(path),
         "interactive": str(page_of_figures) if interactive else None,
         "vehicle": boat.name,
         "database": {"path": db, "version": number, "digest": commit.digest},
-        "rows": len(rows),
+    }
+    return said | _counts(content, len(rows), commit)
+
+
+def _template() -> Template:
+    """The page with its filters."""
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
+    templates = Environment(
+        loader=PackageLoader("ident", "report"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    templates.filters |= {"spans": spans, "term_anchor": term_anchor, "plain": _figure}
+    return templates.get_template("report.html.j2")
+
+
+def _counts(content: dict[str, Any], rows: int, commit: Version) -> dict[str, Any]:
+    """How much a page shows."""
+    return {
+        "rows": rows,
         "coefficients": len(content["present"]),
         "absent": [row["symbol"] for row in content["absent"]],
         "signs": {"expected": content["signs"]["passed"], "of": len(content["signs"]["rows"])},

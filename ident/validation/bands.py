@@ -335,7 +335,14 @@ def fly_samples(
         for i, one in enumerate(chunk_flown, start=place * chunk):
             stacks.put(i, one)
         each(len(chunk_flown))
-    flown = stacks.flown
+    return _bands(case, batch, stacks, draws, correlation, list(estimates["coefficient"]), seed)
+
+
+def _bands(
+    case: Case, batch: Batch, stacks: _Stacks, draws: Array, correlation: Array, estimates: list[str], seed: int
+) -> Bands:
+    """What the flights that came to an end say; raises as ``fly_samples`` where none does."""
+    flown, samples = stacks.flown, len(draws)
     said = {"case": case.name, "samples": samples, "seed": seed, "without_equilibrium": int((~flown).sum())}
     _log.info("samples flown", extra=said)
     if not flown.any():
@@ -348,7 +355,7 @@ def fly_samples(
         as_started=channels,
         draws=draws if flown.all() else draws[flown],
         correlation=correlation,
-        estimates=list(estimates["coefficient"]),
+        estimates=estimates,
         failed=int(samples - flown.sum()),
         seed=seed,
         metrics=tuple(stacks.metrics[i] for i in sorted(stacks.metrics)),

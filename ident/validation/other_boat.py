@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from ident.options import Conditions
 from sim.boat.vehicle import Vehicle, load_vehicle
 from sim.files.errors import InputError
 from sim.files.toml_files import bundled
@@ -27,15 +28,6 @@ _LENGTHS |= {"p": -0.5, "q": -0.5, "r": -0.5}
 _GAINS = {"z": -1.0, "y": -1.0, "theta": 0.0, "psi": 0.0, "r": 0.5, "u": -1.0}
 _TIMES = {"P": 0.0, "I": -0.5, "D": 0.5}
 _STOPS = math.radians(0.01)
-
-
-@dataclass(frozen=True)
-class Asked:
-    """Speed [m/s], depth of the sail top [m] and plane or rudder angle [deg] instead of the case's."""
-
-    speed_mps: float | None = None
-    depth_m: float | None = None
-    angle_deg: float | None = None
 
 
 def _event(event: Event, ratio: float) -> Event:
@@ -141,14 +133,14 @@ def _title(case: Case, vehicle: Vehicle) -> str:
     return f"{name} of {vehicle.name}: {', '.join([*angles, *speed, f'D0 {case.initial.depth_m:g} m'])}"
 
 
-def for_boat(case: Case, where: str, vehicle: Vehicle, asked: Asked) -> tuple[Case, list[str]]:
+def for_boat(case: Case, where: str, vehicle: Vehicle, conditions: Conditions) -> tuple[Case, list[str]]:
     """A case as another boat flies it, or at another speed, depth or angle.
 
     Parameters
     ----------
     case, where : From ``load_case``.
     vehicle : What flies it.
-    asked : Instead of the case's.
+    conditions : Instead of the case's.
 
     Returns
     -------
@@ -160,7 +152,7 @@ def for_boat(case: Case, where: str, vehicle: Vehicle, asked: Asked) -> tuple[Ca
     InputError
         For an angle where the case commands none.
     """
-    at_home, changed = vehicle.name == case.vehicle or _home(case, where) == vehicle.name, asked != Asked()
+    at_home, changed = vehicle.name == case.vehicle or _home(case, where) == vehicle.name, conditions != Conditions()
     if at_home and not changed:
         return case.model_copy(update={"vehicle": vehicle.name}), []
     notes: list[str] = []
@@ -172,16 +164,16 @@ def for_boat(case: Case, where: str, vehicle: Vehicle, asked: Asked) -> tuple[Ca
     if not at_home and where in bundled("cases"):
         ratio = vehicle.particulars.length.value / load_vehicle(home).particulars.length.value
         moved = _scaled(moved, ratio)
-        if case.initial.speed_mps and asked.speed_mps is None:
+        if case.initial.speed_mps and conditions.speed_mps is None:
             text = f"speed {case.initial.speed_mps:.4g} m/s of {home} brought to {moved.initial.speed_mps:.3g} m/s"
             notes.append(f"{text} by Froude's law, times and gains alike; --speed states another")
-    update = {k: v for k, v in (("speed_mps", asked.speed_mps), ("depth_m", asked.depth_m)) if v is not None}
+    update = {k: v for k, v in (("speed_mps", conditions.speed_mps), ("depth_m", conditions.depth_m)) if v is not None}
     moved = moved.model_copy(update={"initial": moved.initial.model_copy(update=update)})
     for axis in ("dV", "dH"):
-        moved, said = _angles(moved, axis, asked.angle_deg, largest_command(case, vehicle, axis))
+        moved, said = _angles(moved, axis, conditions.angle_deg, largest_command(case, vehicle, axis))
         notes += said
-    if asked.angle_deg is not None and not _commanded(moved):
-        raise InputError(f"case {case.name}, --angle", f"{asked.angle_deg:g} deg", "a case that commands an angle")
+    if conditions.angle_deg is not None and not _commanded(moved):
+        raise InputError(f"case {case.name}, --angle", f"{conditions.angle_deg:g} deg", "a case that commands an angle")
     return moved.model_copy(update={"title": _title(moved, vehicle)}), notes
 
 

@@ -11,7 +11,7 @@ from pathlib import Path
 from ident.validation.board import BoardCase, ComparedError, Parent, Scoreboard
 from ident.validation.boats import Boat, Fleet
 from ident.validation.result import ChannelError, Validation
-from ident.validation.validate import errors, flights, validate
+from ident.validation.validate import errors, flights, validated
 from sim.boat.catalogue import CatalogueError
 from sim.boat.vehicle import Vehicle, load_vehicle
 from sim.files.errors import InputError
@@ -101,7 +101,7 @@ def _one(name: str, fleet: Fleet) -> BoardCase:
     """A case flown, or why it was not."""
     boat = fleet.boat(_vehicle_of(name))
     try:
-        done = validate(name, fleet.db, fleet.number, fleet=fleet)
+        done = validated(name, fleet)
     except NoEquilibrium as error:
         case = load_case(name)[0].name
         database = {"path": fleet.db, "version": boat.commit.number, "digest": boat.commit.digest}

@@ -12,11 +12,13 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from ident.deprecation import gathered
 from ident.metrics.measure import measured
 from ident.metrics.metric import Metrics
+from ident.options import Conditions, OwnReference
 from ident.validation.boats import Boat, Fleet
 from ident.validation.coverage import outside_tables
-from ident.validation.other_boat import Asked, check_answers, for_boat, saturated
+from ident.validation.other_boat import check_answers, for_boat, saturated
 from ident.validation.references import beyond_the_run, check_reference, compared
 from ident.validation.result import ChannelError, Validation
 from ident.validation.sweep import with_grid
@@ -143,19 +145,17 @@ def _passed(case: Case, by_source: dict[str, dict[str, ChannelError]]) -> bool:
     return True
 
 
-def _with_reference(case: Case, path: Path, frame: str | None, trial: str | os.PathLike[str] | None) -> Referenced:
-    """A case held against a user's own reference file, every channel that the simulation has.
-
-    Parameters
-    ----------
-    frame : ``source`` (x aft, z up), ``program`` (x forward, z down), or None: as the case
-        declares, else the program frame.
+def _with_reference(case: Case, record: OwnReference) -> Referenced:
+    """A case held against a user's own record, every channel that the simulation has.
 
     Raises
     ------
     InputError
         For a file that cannot be read or holds nothing to compare.
     """
+    path, frame, trial = Path(record.path), record.frame, record.trial
+    if frame not in (None, *_FRAMES):
+        raise InputError(f"reference {path}, frame", repr(frame), " or ".join(_FRAMES))
     declared = case.reference.frame if case.reference and not frame else _FRAMES[frame or "program"]
     if not path.is_file():
         raise InputError(str(path), "no such file", "a CSV file: source, channel, t or s, value, unit")
@@ -185,20 +185,24 @@ def _with_reference(case: Case, path: Path, frame: str | None, trial: str | os.P
     return Referenced(case.model_copy(update={"reference": reference, "tolerance": []}), smoothed(series))
 
 
+@gathered(
+    "0.2",
+    {"conditions": Conditions, "reference": OwnReference},
+    speed=("conditions", "speed_mps", None),
+    depth=("conditions", "depth_m", None),
+    angle=("conditions", "angle_deg", None),
+    frame="reference",
+    trial="reference",
+)
 def validate(
     case: str | os.PathLike[str],
     db: str | os.PathLike[str] = "coeff_db",
     version: int | None = None,
     *,
     vehicle: str | os.PathLike[str] | None = None,
-    reference: str | os.PathLike[str] | None = None,
-    frame: str | None = None,
-    trial: str | os.PathLike[str] | None = None,
-    speed: float | None = None,
-    depth: float | None = None,
-    angle: float | None = None,
+    reference: str | os.PathLike[str] | OwnReference | None = None,
+    conditions: Conditions = Conditions(),  # noqa: B008  (frozen)
     without: Collection[str] = (),
-    fleet: Fleet | None = None,
 ) -> Validation:
     """Fly a case from a database version and hold it against its references.
 
@@ -207,15 +211,9 @@ def validate(
     case : Bundled case or path to a case file.
     db, version : Folder or URL of the database, and version, latest when None.
     vehicle : Bundled vehicle or path to a vehicle file, instead of the case's.
-    reference : Your own reference instead of the case's: a recorded trial as ``ident trial`` reads it, or
-        a CSV of source, channel, t or s, value, unit, and sigma where it is known.
-    frame : Frame of ``reference``: ``source`` (x aft, z up) or ``program`` (x forward, z down);
-        the case's when None.
-    trial : ``trial.toml`` with what ``reference``, then a recorded trial, does not say of itself.
-    speed, depth, angle : Speed [m/s], depth of the sail top [m] and plane angle [deg] instead of the
-        case's; references then do not apply.
+    reference : Your own record instead of the case's, or its path alone.
+    conditions : Speed, depth and plane angle instead of the case's; references then do not apply.
     without : Terms such as ``N_ur`` and estimates such as ``cross_flow`` that the version is flown without.
-    fleet : The database version, where more than one case is flown from it.
 
     Returns
     -------
@@ -235,10 +233,24 @@ def validate(
     >>> sorted(done.errors["TRIAL"])
     ['psi', 'r', 'u']
     """
-    asked = Asked(speed, depth, angle)
-    held, ship, where, notes = _held_against(case, vehicle, asked, reference, frame, trial)
-    flown = held.case
-    boat = (fleet or Fleet(os.fspath(db), version, without)).boat(ship)
+    held = _held_against(case, vehicle, conditions, reference)
+    return _validated(held, Fleet(os.fspath(db), version, without))
+
+
+def validated(
+    case: str | os.PathLike[str],
+    fleet: Fleet,
+    *,
+    vehicle: str | os.PathLike[str] | None = None,
+    reference: str | os.PathLike[str] | OwnReference | None = None,
+) -> Validation:
+    """``validate`` from a database version that several cases are flown from."""
+    return _validated(_held_against(case, vehicle, Conditions(), reference), fleet)
+
+
+def _validated(as_held: tuple[Referenced, Vehicle, str, list[str]], fleet: Fleet) -> Validation:
+    held, ship, where, notes = as_held
+    flown, boat = held.case, fleet.boat(ship)
     simulation, as_started = _every_flight(held, boat, where)
     channel_errors = errors(flown, held.series, simulation, as_started)
     measures = measured(flown, simulation, held.series, as_started)
@@ -254,7 +266,7 @@ def validate(
         simulation=simulation,
         reference=held.series,
         boat=boat,
-        db=os.fspath(db),
+        db=fleet.db,
         errors=channel_errors,
         metrics={name: replace(m, sigma=held.sigma.get(name, {})) for name, m in metrics.items()},
         as_started=as_started,
@@ -272,17 +284,16 @@ def validate(
 def _held_against(
     case: str | os.PathLike[str],
     vehicle: str | os.PathLike[str] | None,
-    asked: Asked,
-    reference: str | os.PathLike[str] | None,
-    frame: str | None,
-    trial: str | os.PathLike[str] | None,
+    conditions: Conditions,
+    reference: str | os.PathLike[str] | OwnReference | None,
 ) -> tuple[Referenced, Vehicle, str, list[str]]:
     """The case with its references as it is to be flown, by which vehicle, the case's place, and notes."""
     flown, where = load_case(os.fspath(case))
     ship = load_vehicle(os.fspath(vehicle)) if vehicle else load_vehicle(flown.vehicle, beside=where)
-    flown, notes = for_boat(flown, where, ship, asked)
+    flown, notes = for_boat(flown, where, ship, conditions)
     if reference is not None:
-        held = _with_reference(flown, Path(reference), frame, trial)
+        stated = reference if isinstance(reference, OwnReference) else OwnReference(reference)
+        held = _with_reference(flown, stated)
     else:
         held = referenced(flown, where)
     unknown = check_reference(held.case, held.series, where)

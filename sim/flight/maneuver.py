@@ -213,7 +213,7 @@ def _turn_over(v: Flight, axis: int, now: float, log: Log, events: int) -> int:
 
 
 @outer
-def run(
+def integrate(
     v: Flight, around: Around, log: Log, dt: float, steps: int, every: int, start: float
 ) -> tuple[int, int, int, float]:
     """Integrate a maneuver.
@@ -229,8 +229,7 @@ def run(
 
     Returns
     -------
-    (rows recorded, executes, steps that ended, time at the end [s]); there may have been more
-    executes and steps than the log has room for.
+    (rows recorded, executes, steps that ended, time at the end [s]); there may be more than the log has room for.
     """
     trial, read, change = np.empty(N_STATES), np.empty(N_STATES), np.empty(N_STATES)
     rate, near = np.empty(v.c.size), near_of(around)
@@ -353,7 +352,7 @@ def fly_logged(
     while True:
         log = Log(record, np.zeros((room, 2)), np.zeros((room, 3)))
         flight = flight_of(model, settings, work, y0.copy(), c0.copy())
-        rows, executes, ended, end = run(flight, work.around, log, dt, steps, every, 0.0)
+        rows, executes, ended, end = integrate(flight, work.around, log, dt, steps, every, 0.0)
         if max(executes, ended) <= room:
             break
         room = max(executes, ended)
