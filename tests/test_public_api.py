@@ -95,6 +95,15 @@ def test_a_public_name_is_loaded_with_no_more_than_it_needs():
     assert not {"numba", "matplotlib", "xarray", "scipy"} & set(modules)
 
 
+def test_a_flight_imports_no_library_that_it_does_not_use():
+    """Of what a command takes before it flies, most is imports: a number of modules is the same on every machine."""
+    _, modules = _loaded("import ident.validation.validate, ident.validation.tables")
+    found = set(modules)
+    assert not {"matplotlib", "scipy.sparse", "scipy.optimize", "scipy.interpolate", "xarray"} & found
+    assert not {"ident.captive.campaign", "ident.trials.trial", "ident.identification.identify"} & found
+    assert sum(name.partition(".")[0] in ("ident", "sim") for name in found) <= 110
+
+
 def _equal(one, other):
     """JSON content without the time stamps of two commits."""
     return json.loads(json.dumps(one)) == json.loads(json.dumps(other))

@@ -6,7 +6,6 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_array
 
 from sim.boat.catalogue import BOAT_FEATURES, OUTPUTS, PLANE_FEATURES, feature_index, held, terms
 from sim.boat.coefficients import Coefficient, Coefficients
@@ -305,6 +304,9 @@ class Assembly:
     """
 
     def __init__(self, coefficients: Coefficients, environment: Environment) -> None:
+        # A single flight needs no sparse products, and their import takes longer than the flight.
+        from scipy.sparse import csr_array
+
         self._base = assemble(coefficients, environment)
         places = coefficients.places
         flat = _Flat(coefficients, environment)
