@@ -23,6 +23,8 @@ _EQUAL = 1e-5
 # Variance below which a value has no score of its own among the values of its coefficient: draws leave
 # out up to twice ``_EQUAL`` of it.
 _SCORED = 1e-4
+# Samples drawn at once: their numbers stay in the processor's cache while the columns are added.
+_AT_ONCE = 32
 # A matrix that its factor gives back no better than this is not one of correlations.
 _REFUSED = 1e-3
 
@@ -84,7 +86,7 @@ def factor(correlation: Array, least: float = 2.0 * _EQUAL) -> list[Block]:
 
 
 def _block(members: Places, correlation: Array, least: float) -> Block:
-    rest, pivots, columns = correlation.copy(), [], []
+    rest, product, pivots, columns = correlation.copy(), np.empty_like(correlation), [], []
     left = np.ones(members.size, dtype=bool)
     for _ in range(members.size):
         variance = np.where(left, np.diag(rest), -np.inf)
@@ -93,7 +95,7 @@ def _block(members: Places, correlation: Array, least: float) -> Block:
         pivot = int(np.argmax(variance >= variance.max() - _EQUAL))
         # Rows of earlier pivots are zero but for rounding.
         column = np.where(left, rest[:, pivot] / np.sqrt(rest[pivot, pivot]), 0.0)
-        rest -= column[:, None] * column[None, :]
+        rest -= np.multiply(column[:, None], column, out=product)
         left[pivot] = False
         pivots.append(pivot)
         columns.append(column)
@@ -128,9 +130,14 @@ def draw(correlation: Array, samples: int, seed: int) -> Array:
     normal = np.stack([np.random.default_rng(child).standard_normal(len(correlation)) for child in children])
     out = np.zeros_like(normal)
     for block in factor(correlation):
-        # Element by element: a product of matrices would round as its library sees fit.
-        for pivot, column in zip(block.pivots, block.root.T, strict=True):
-            out[:, block.members] += normal[:, pivot, None] * column
+        for low in range(0, samples, _AT_ONCE):
+            some = normal[low : low + _AT_ONCE, block.pivots]
+            # Element by element: a product of matrices would round as its library sees fit.
+            total = np.zeros((len(some), block.members.size))
+            share = np.empty_like(total)
+            for z, column in zip(some.T, block.root.T, strict=True):
+                total += np.multiply(z[:, None], column, out=share)
+            out[low : low + _AT_ONCE, block.members] = total
     return out
 
 
