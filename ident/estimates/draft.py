@@ -202,7 +202,10 @@ class Draft:
         captive = self.scale[at] * first["stderr"].to_numpy()
         total = np.outer(captive, captive) * matrix
         for direction in self.directions.values():
-            total += np.outer(direction[at], direction[at])
+            # An unknown moves a part of the values only.
+            moved = np.flatnonzero(direction[at])
+            change = direction[at[moved]]
+            total[np.ix_(moved, moved)] += np.outer(change, change)
         return with_covariance(out, list(first["estimate"]), total)
 
 

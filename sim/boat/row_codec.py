@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterable, Sequence
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -74,12 +75,14 @@ def correlation_texts(covariance: Array, names: Iterable[int] | None = None) -> 
     scale = np.outer(stderr, stderr)
     matrix = np.divide(covariance, scale, out=np.zeros_like(covariance), where=scale > 0.0)
     np.fill_diagonal(matrix, 0.0)
-    texts: dict[int, list[str]] = {}
     row, column = np.nonzero(np.abs(matrix) > _LEAST_CORRELATION)
-    # Plain numbers: a version has some hundred thousand pairs.
-    for i, j, x in zip(row.tolist(), column.tolist(), matrix[row, column].tolist(), strict=True):
-        texts.setdefault(number[i], []).append(f"{number[j]}:{x:.6g}")
-    return {i: " ".join(items) for i, items in texts.items()}
+    # A version has some hundred thousand pairs, half of them equal to another: each number is written once.
+    different, which = np.unique(matrix[row, column], return_inverse=True)
+    written = [f"{x:.6g}" for x in different.tolist()]
+    before = [f"{n}:" for n in number]
+    pairs = [before[j] + written[k] for j, k in zip(column.tolist(), which.tolist(), strict=True)]
+    ends = np.searchsorted(row, np.arange(len(number) + 1)).tolist()
+    return {number[i]: " ".join(pairs[low:high]) for i, (low, high) in enumerate(pairwise(ends)) if low < high}
 
 
 def correlation_pairs(text: str) -> dict[int, float]:
