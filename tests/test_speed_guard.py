@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
 from sim.bench.boat import frozen_boat
@@ -40,6 +42,19 @@ def test_commands_that_are_timed_are_those_of_the_command_line(tmp_path):
         options = {name for parameter in command.params for name in parameter.opts}
         assert shown.split()[1] == arguments[0]
         assert {a for a in arguments if a.startswith("--")} <= options
+
+
+def test_the_larger_campaigns_that_are_timed_have_every_run_so_often(tmp_path):
+    import csv
+
+    from ident.commands import times
+
+    campaign = Path(__file__).parents[1] / "raw_captive_data" / "bb2"
+    times.larger(campaign, tmp_path, (3,))
+    (arguments,) = (a for a in times.commands(campaign, tmp_path, (3,)).values() if a[1] == str(tmp_path / "x3"))
+    for path in campaign.glob("*.csv"):
+        with path.open(encoding="utf-8") as own, (Path(arguments[1]) / path.name).open(encoding="utf-8") as made:
+            assert len(list(csv.reader(made))) - 1 == 3 * (len(list(csv.reader(own))) - 1)
 
 
 def test_a_command_that_fails_is_not_timed():

@@ -14,11 +14,14 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from importlib.resources import files
 from pathlib import Path
 
 _RECORDED = Path("data") / "command_times.csv"
+# How often each run of the campaign stands in the larger ones that are fitted too; with --million the last as well.
+_REPEATED, _MILLION = (10, 100), 2300
 
 
 @dataclass(frozen=True)
@@ -39,13 +42,14 @@ class CommandTime:
     memory_GB: float
 
 
-def commands(campaign: Path, folder: Path) -> dict[str, list[str]]:
+def commands(campaign: Path, folder: Path, repeated: Sequence[int] = _REPEATED) -> dict[str, list[str]]:
     """Every command that is timed, in an order in which each finds what it needs.
 
     Parameters
     ----------
     campaign : Folder of runs of BB2.
-    folder : Where database and reports go.
+    folder : Where database and reports go, and where ``larger`` puts its campaigns.
+    repeated : How often each run stands in them.
     """
     db, out = ["--db", str(folder / "db")], ["--out", str(folder / "reports")]
     return {
@@ -55,7 +59,27 @@ def commands(campaign: Path, folder: Path) -> dict[str, list[str]]:
         "ident validate --all": ["validate", "--all", *db, *out],
         "ident validate --case hzz20 --samples 1000": ["validate", "--case", "hzz20", "--samples", "1000", *db, *out],
         "ident calibrate bb2": ["calibrate", "bb2", *db],
+    } | {
+        f"ident fit (each run {times:,} times)": ["fit", str(_place(folder, times)), "--db", str(folder / f"db{times}")]
+        for times in repeated
     }
+
+
+def _place(folder: Path, times: int) -> Path:
+    return folder / f"x{times}"
+
+
+def larger(campaign: Path, folder: Path, repeated: Sequence[int] = _REPEATED) -> None:
+    """Write the campaigns whose fits are timed: each run of another repeated with 1 % noise on its loads.
+
+    Parameters
+    ----------
+    campaign, folder, repeated : As of ``commands``.
+    """
+    from ident.fitting.bench import repeated_campaign
+
+    for times in repeated:
+        repeated_campaign(campaign, _place(folder, times), times)
 
 
 def timed(name: str, arguments: list[str]) -> CommandTime:
@@ -84,10 +108,13 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("campaign", type=Path, help="folder of the runs of BB2")
     parser.add_argument("--record", action="store_true", help="write data/command_times.csv; on an idle machine only")
+    parser.add_argument("--million", action="store_true", help=f"also fit each run {_MILLION:,} times: some minutes")
     options = parser.parse_args()
+    campaign, repeated = options.campaign.resolve(), (*_REPEATED, *[_MILLION] * options.million)
     measured = []
     with tempfile.TemporaryDirectory() as folder:
-        for name, arguments in commands(options.campaign.resolve(), Path(folder)).items():
+        larger(campaign, Path(folder), repeated)
+        for name, arguments in commands(campaign, Path(folder), repeated).items():
             measured.append(timed(name, arguments))
             one = measured[-1]
             print(f"{name:45} {one.wall_s:7.2f} s, {one.processor_s:.2f} s of processor, {one.memory_GB:.2f} GB")
