@@ -8,6 +8,7 @@ import pytest
 
 from sim.bench.boat import frozen_boat
 from sim.bench.guard import fallen, recorded
+from sim.bench.measure import shortest
 
 
 def _today(**changes):
@@ -26,6 +27,14 @@ def test_a_ratio_that_falls_by_more_than_a_quarter_is_named(line):
     assert fallen(_today(**{line.name: near * line.value})) == []
     assert [text.split(":")[0] for text in fallen(_today(**{line.name: worse * line.value}))] == [line.name]
     assert fallen(_today(**{line.name: float("nan")})) != []
+
+
+def test_who_waits_is_not_slower():
+    import time
+
+    found = shortest({"works": lambda: sum(range(2000)), "waits": lambda: time.sleep(0.01)}, 5)
+    assert found["waits"] < 0.001
+    assert 0.0 < found["works"] < 0.01
 
 
 def test_the_frozen_boat_has_the_shape_of_the_fitted_one(coefficients):
