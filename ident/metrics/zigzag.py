@@ -94,7 +94,7 @@ def zigzag(
     ``overshoot_k_deg``: largest angle after the k-th check less the check angle.
     ``execute_k_s``: time of the k-th plane execute after the first (k = 2 is the first
     check). ``period_s``: second to fourth execute. ``peak_<name>_rate_k_degps``: largest
-    rate on the k-th leg. None where the record ends before.
+    rate on the k-th leg, its ends included: it may still grow when the plane is reversed. None where the record ends before.
     """
     swings = legs(t, angle, check, sense)
     metrics: dict[str, float | None] = {}
@@ -110,11 +110,15 @@ def zigzag(
         for k in range(3):
             value = None
             if k + 1 < len(bounds):
-                inside = (rate[0] >= bounds[k]) & (rate[0] <= bounds[k + 1])
-                if inside.any():
-                    value = float(np.degrees(np.max(sense * (-1) ** k * rate[1][inside])))
+                value = float(np.degrees(_largest(rate, sense * (-1) ** k, bounds[k], bounds[k + 1])))
             metrics[f"peak_{name}_rate_{k + 1}_degps"] = value
     return {k: float(v) if v is not None else None for k, v in metrics.items()}
+
+
+def _largest(rate: tuple[Array, Array], sense: int, begin: float, end: float) -> float:
+    """Largest rate to one side between two times, at the samples and at the times themselves."""
+    inside = (rate[0] >= begin) & (rate[0] <= end)
+    return float(np.max(sense * np.concatenate([rate[1][inside], np.interp([begin, end], *rate)])))
 
 
 def roll_decay(t: Array, phi: Array) -> dict[str, float | None]:

@@ -62,6 +62,7 @@ class SmoothPath:
     factor : Banded upper factor of the precision of the coefficients.
     sigma : Standard error of one sample of the path.
     samples : What it was made from, less ``centre``, each with its standard error.
+    shared : Changes of the coefficients by one standard error of what all samples share.
     """
 
     knots: Array
@@ -70,6 +71,7 @@ class SmoothPath:
     sigma: float
     samples: tuple[Samples, ...]
     centre: float
+    shared: tuple[Array, ...] = ()
 
     def __call__(self, time: Array | float, derivative: int = 0) -> Array:
         """The most likely path, or its derivative, at some times [s]."""
@@ -83,7 +85,16 @@ class SmoothPath:
 
         normal = rng.standard_normal((self.mean.size, count))
         away = solve_banded((0, len(self.factor) - 1), self.factor, normal)
+        for one in self.shared:
+            away += one[:, None] * rng.standard_normal(count)
         return [replace(self, mean=self.mean + one) for one in away.T]
+
+    def response(self, samples: tuple[Samples, ...]) -> tuple[Array, Array]:
+        """B'Wy of other values at the samples, and the coefficients of the path through them."""
+        from scipy.linalg import cho_solve_banded
+
+        right = np.sum([_gram(self.knots, one)[1] for one in samples], axis=0)
+        return right, cho_solve_banded((self.factor, False), right)
 
     def again(self) -> SmoothPath:
         """This path smoothed once more as its samples were: the difference is the bias of smoothing."""
@@ -122,7 +133,10 @@ class SmoothPath:
                 [self.deviation(piece, derivative) for piece in np.array_split(at, at.size // 64 + 1)]
             )
         solved = cho_solve_banded((self.factor, False), basis.T)
-        return np.asarray(np.sqrt(np.maximum(np.einsum("ij,ji->i", basis, solved), 0.0)), dtype=np.float64)
+        variance = np.einsum("ij,ji->i", basis, solved)
+        for one in self.shared:
+            variance += (basis @ one) ** 2
+        return np.asarray(np.sqrt(np.maximum(variance, 0.0)), dtype=np.float64)
 
 
 def _penalty(knots: Array) -> Array:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ident.timeseries.scaled_rate import smooth_with_rate
 from ident.timeseries.smoothing import Samples, SmoothPath, smooth
 from ident.trials.body import angle_rate
 from ident.trials.consistency import path_of, regressed
@@ -322,7 +323,8 @@ def _from_a_steady_course(path: SmoothPath, execute: float, said: list[str]) -> 
         return path
     said.append(f"steady course at the execute: its rate there is zero to {100.0 * _STEADY:g} % of the largest")
     steady = Samples(np.array([execute]), np.zeros(1), 1, share)
-    return smooth([replace(path.samples[0], value=path.samples[0].value + path.centre), *path.samples[1:], steady])
+    first = replace(path.samples[0], value=path.samples[0].value + path.centre)
+    return replace(smooth([first, *path.samples[1:], steady]), shared=path.shared)
 
 
 def _joined(
@@ -340,6 +342,5 @@ def _joined(
     if pair is None or abs(pair.slope - 1.0) > _CLOSE or abs(pair.offset) > 6.0 * offset_error + 1e-6:
         return None
     first = Samples(samples[0].time, samples[0].value, 0, samples[0].sigma or path.sigma)
-    value = (inside.value - pair.offset) / pair.slope
-    sigma = math.hypot(noise or scatter, body_rate * float(np.sqrt(np.mean(value**2))))
-    return smooth([first, Samples(inside.abscissa, value, 1, sigma)])
+    sigma = math.hypot(noise or scatter, body_rate * float(np.sqrt(np.mean(inside.value**2))))
+    return smooth_with_rate(first, Samples(inside.abscissa, inside.value, 1, sigma), _CLOSE)
