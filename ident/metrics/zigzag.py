@@ -94,7 +94,8 @@ def zigzag(
     ``overshoot_k_deg``: largest angle after the k-th check less the check angle.
     ``execute_k_s``: time of the k-th plane execute after the first (k = 2 is the first
     check). ``period_s``: second to fourth execute. ``peak_<name>_rate_k_degps``: largest
-    rate on the k-th leg, its ends included: it may still grow when the plane is reversed. None where the record ends before.
+    rate on the k-th leg, its ends included: it may still grow when the plane is reversed.
+    None where the record ends before.
     """
     swings = legs(t, angle, check, sense)
     metrics: dict[str, float | None] = {}
