@@ -309,3 +309,27 @@ def test_folder_of_runs_gives_scatter_and_port_against_starboard(tmp_path):
     assert 0.2 < port["scatter"] / port["stated"] < 3.0
     gap = port["port_less_starboard"]
     assert abs(gap["value"]) < 3.0 * gap["sigma"]
+
+
+def test_columns_with_their_units_in_a_row_below_a_title(tmp_path):
+    one = zigzag()
+    lines = ["Basin test 201_004, zigzag", "scale 1", "TIME  PSI  R  DELTA", "[s]  [deg]  [deg/s]  [deg]"]
+    rows = zip(one["t"], one["psi"], one["r"], one["dH"], strict=True)
+    lines += ["  ".join(f"{v:.5f}" for v in row) for row in rows]
+    (tmp_path / "zz.txt").write_text("\n".join(lines), encoding="utf-8")
+    done = held(tmp_path / "zz.txt", truth()["zigzag"])
+    assert "row 4: units of the columns" in done.assumed
+
+
+def test_degree_signs_of_a_western_encoding_are_read_and_said(tmp_path):
+    one = zigzag()
+    lines = ["Zeit;Kurswinkel;Ruderwinkel", "s;°;°"]
+    lines += [
+        f"{t:.2f};{a:.3f};{b:.2f}".replace(".", ",") for t, a, b in zip(one["t"], one["psi"], one["dH"], strict=True)
+    ]
+    (tmp_path / "zz.csv").write_text("\n".join(lines), encoding="latin-1")
+    done = held(tmp_path / "zz.csv", truth()["zigzag"])
+    assert "no UTF-8: read as cp1252" in done.assumed
+    (tmp_path / "zz.csv").write_text("\n".join(["時刻;針路", *lines[2:]]), encoding="shift_jis")
+    with pytest.raises(InputError, match="not utf-8 text"):
+        measure_trial(tmp_path / "zz.csv", None, COUNT)

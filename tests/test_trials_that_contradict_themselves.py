@@ -223,3 +223,12 @@ def test_a_flight_as_ident_fly_writes_it_has_two_depths_and_one_is_used(tmp_path
     found = measure_trial(write(tmp_path / "one.csv", record), None, COUNT)
     assert found.recording.channels["z"].value[0] == 30.0
     assert any("D0 [m]: not used" in text for text in found.assumed)
+
+
+def test_speeds_ahead_and_abeam_exchanged_are_told_without_a_track(tmp_path):
+    one = zigzag()
+    record = {"t [s]": one["t"], "psi [deg]": one["psi"], "delta [deg]": one["dH"]}
+    record |= {"u [m/s]": 0.1 * one["r"], "v [m/s]": one["u"]}
+    error = refusal(tmp_path, record)
+    assert "going sideways" in error.found
+    assert "channels exchanged, u [m/s] and v [m/s]" in error.found

@@ -31,7 +31,7 @@ def exchanged(one: Recording) -> list[Finding]:
     """
     path = cache(lambda name: path_of(one.channels[name]))
     of_columns: dict[frozenset[str], Finding] = {}
-    for finding in (*_along_the_track(one, path), *_rates(one, path)):
+    for finding in (*_along_the_track(one, path), *_abeam(one), *_rates(one, path)):
         of_columns.setdefault(frozenset(finding.columns), finding)
     return list(of_columns.values())
 
@@ -99,6 +99,16 @@ def _along_the_track(one: Recording, path: Callable[[str], SmoothPath]) -> Itera
             like_it = pair is not None and pair.correlation > _NOT
             if own > _SIZE * size and away < _NEARER * own and away < _SIZE * size and (like_it or name == "u"):
                 yield _finding(one, name, other, f"the {_WORDS[name]} of the track stands in {one.headers[other]}")
+
+
+def _abeam(one: Recording) -> Iterator[Finding]:
+    """A boat that begins its maneuver going sideways: speeds ahead and abeam exchanged, told without a track."""
+    if not {"u", "v"} <= set(one.channels) or "north" in one.channels:
+        return
+    ahead, abeam = (one.channels[name].value for name in ("u", "v"))
+    first = max(_FEWEST, ahead.size // 50)
+    if abs(float(np.median(abeam[:first]))) > 2.0 * abs(float(np.median(ahead[:first]))):
+        yield _finding(one, "u", "v", f"the boat begins by going sideways, at the speed in {one.headers['v']}")
 
 
 _WORDS = {"u": "speed ahead", "v": "speed abeam"}

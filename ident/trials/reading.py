@@ -33,6 +33,7 @@ _TIMES = ("t", "time", "time s", "t s")
 _DEGREES = re.compile(
     r"""(\d+(?:\.\d+)?)\s*[°d\s]\s*(\d+(?:\.\d+)?)?\s*['′\s]?\s*(\d+(?:\.\d+)?)?\s*["″]?\s*([NSEWnsew])"""
 )
+_WESTERN = "°²³µäöüßÄÖÜéèêàåøæÅØÆçñ"
 _BLANK = ("", "nan", "na", "n/a", "-", "--", "null", "none", "inf")
 
 
@@ -75,6 +76,8 @@ class Recording:
 def _source(path: Path, spec: TrialFile) -> Source:
     """How the file is to be opened; a header below titles, or in front of white-space columns, is found."""
     given = {k: getattr(spec, k) for k in ("delimiter", "decimal", "encoding", "header_pattern", "skip", "units_row")}
+    if given["encoding"] == "utf-8" and _western(path):
+        given["encoding"] = "cp1252"
     source = Source(files=path.name, **given)
     if spec.header_pattern or reader_of(path, source) not in ("table", "columns"):
         return source
@@ -95,6 +98,19 @@ def _source(path: Path, spec: TrialFile) -> Source:
         allowed = "a header with the names of the columns, or header_pattern in trial.toml"
         raise InputError(str(path), "columns without a header that names channels", allowed)
     return source.model_copy(update={"header_pattern": _exactly(lines[named[-1]])})
+
+
+def _western(path: Path) -> bool:
+    """Whether a text is no UTF-8, and its only further bytes are single letters and signs of Western Europe."""
+    text = path.read_bytes()
+    if text.isascii() or b"\0" in text:
+        return False
+    try:
+        text.decode("utf-8")
+    except UnicodeDecodeError:
+        further = re.findall(rb"[\x80-\xff]+", text)
+        return all(len(one) == 1 and one.decode("cp1252", "replace") in _WESTERN for one in further)
+    return False
 
 
 def _below_a_title(lines: list[str]) -> bool:
@@ -132,13 +148,31 @@ def _cells(sheet: Sheet) -> tuple[list[int], list[list[str]]]:
 
 def _units_below(sheet: Sheet, cells: list[list[str]]) -> list[str] | None:
     """The first row where it holds units and no number: headers with them; None where it does not."""
-    first = cells[0]
-    if any(sheet.dialect.number(c) is not None or parsed(c, None) is not None for c in first) or not any(first):
+    return _with_units(sheet, cells[0])
+
+
+def _with_units(sheet: Sheet, first: list[str]) -> list[str] | None:
+    """Headers with the units of a row; None where it is no row of units."""
+    if (
+        len(first) != len(sheet.header)
+        or any(sheet.dialect.number(c) is not None or parsed(c, None) is not None for c in first)
+        or not any(first)
+    ):
         return None
     units = [c.strip("[]() ") for c in first]
     if not all(u in ("", "-") or is_unit(u) or is_unit(u.lower()) for u in units):
         return None
     return [h if u in ("", "-") else f"{h} [{u}]" for h, u in zip(sheet.header, units, strict=True)]
+
+
+def _units_passed(path: Path, source: Source, sheet: Sheet, first_row: int) -> tuple[int, list[str]] | None:
+    """A row of units between the header of white-space columns and their first numbers."""
+    if reader_of(path, source) != "columns":
+        return None
+    lines = head(path, source.encoding, (), source.skip)
+    above = [(row, text.split()) for row, text in zip(lines.rows, lines.text, strict=True) if row < first_row]
+    found = ((row, _with_units(sheet, cells)) for row, cells in reversed(above))
+    return next(((row, header) for row, header in found if header and any(h.endswith("]") for h in header)), None)
 
 
 def read_recording(path: Path, spec: TrialFile) -> Recording:
@@ -157,13 +191,19 @@ def read_recording(path: Path, spec: TrialFile) -> Recording:
     """
     if not path.is_file():
         raise InputError(str(path), "no such file", "a table with a time column and a column a channel")
-    sheet = open_sheet(path, _source(path, spec))
+    source = _source(path, spec)
+    sheet = open_sheet(path, source)
     rows, cells = _cells(sheet)
     header, said = list(sheet.header), []
+    if source.encoding != spec.encoding:
+        said.append(f"no UTF-8: read as {source.encoding}")
     below = _units_below(sheet, cells)
     if below:
         header, rows, cells = below, rows[1:], cells[1:]
         said.append(f"row {sheet.first_row}: units of the columns")
+    elif passed := _units_passed(path, source, sheet, rows[0]):
+        row, header = passed
+        said.append(f"row {row}: units of the columns")
     if all(word in [plain(h) for h in header] for word in _LONG):
         return _long(sheet, header, rows, cells, spec, said)
     return _wide(sheet, header, rows, cells, spec, said)

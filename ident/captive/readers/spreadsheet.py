@@ -14,7 +14,7 @@ from sim.files.errors import InputError
 
 
 def open_workbook(path: Path, source: Source) -> Sheet:
-    """One worksheet: the first row of names, perhaps a row of units, rows of cells.
+    """One worksheet: titles of one cell, the first row of names, perhaps a row of units, rows of cells.
 
     ``table`` names the worksheet where several hold cells, ``header_pattern`` finds the row of names
     (its cells joined by tabs) below a title, ``skip`` leaves out rows, ``units_row`` reads a row of units.
@@ -48,7 +48,8 @@ def _filled(row: list[Any]) -> bool:
 def _sheet(path: Path, name: str, rows: list[list[Any]], source: Source) -> Sheet:
     where = f"{path}, worksheet {name!r}"
     numbered = [(i, row) for i, row in enumerate(rows, start=1) if _filled(row)]
-    at = 0
+    # A row of one cell above a table of several columns is its title.
+    at = next((k for k, (_, row) in enumerate(numbered) if sum(c not in (None, "") for c in row) > 1), 0)
     if source.header_pattern:
         at = next((k for k, (_, row) in enumerate(numbered) if search(source.header_pattern, _joined(row))), -1)
         if at < 0:
