@@ -57,6 +57,19 @@ def test_a_number_of_no_boat_is_named_with_its_rows(folder, old, new, check, col
     assert found[0].rows
 
 
+@pytest.mark.parametrize("t", ["10", "-1.8", "1.18"])
+def test_more_than_the_thrust_is_not_deducted(tmp_path, t):
+    folder = tmp_path / "bb2"
+    shutil.copytree(ROOT / "raw_captive_data" / "bb2", folder)
+    path = folder / "self_propulsion.csv"
+    table = pd.read_csv(path, dtype=str, keep_default_na=False)
+    assert not findings(folder, "state")
+    table.loc[table.index[0], "t"] = t
+    table.to_csv(path, index=False)
+    (only,) = findings(folder, "state")
+    assert (only.severity, only.columns, len(only.rows)) == ("error", ("t",), 1)
+
+
 def test_a_campaign_of_zeros_is_refused(tmp_path):
     folder = tmp_path / "bb2"
     shutil.copytree(ROOT / "raw_captive_data" / "bb2", folder)

@@ -110,6 +110,33 @@ def test_added_mass_that_no_water_has_is_not_flown(rows, coefficient, factor, wo
         assemble(Coefficients(vehicle, wrong), WATER)
 
 
+@pytest.mark.parametrize(("coefficient", "value"), [("t", 10.0), ("t", 1.0), ("t", -1.5), ("w_T", 1.2), ("w_T", -3.0)])
+def test_a_share_of_thrust_or_speed_that_no_hull_takes_is_not_flown(rows, coefficient, value):
+    """Of the thrust 1 - t moves the boat, of the speed 1 - w reaches the propeller: both above zero."""
+    own = rows["coefficient"] == coefficient
+    assert own.any()
+    wrong = rows.assign(value=rows["value"].where(~own, value))
+    with pytest.raises(InputError, match=f"{coefficient}.*below 1"):
+        assemble(Coefficients(load_vehicle("bb2"), wrong), WATER)
+
+
+@pytest.mark.parametrize("key", ["geometry", "errata"])
+def test_a_file_that_a_vehicle_names_is_there_or_refused(tmp_path, monkeypatch, key):
+    """Beside the vehicle's file, bundled, or where a variable of the environment says."""
+    name = "bb2/geometry.toml" if key == "geometry" else "bb2/errata.csv"
+    ours = getattr(load_vehicle("bb2"), key)
+    assert getattr(load_vehicle(written(tmp_path, "vehicles", "bb2")), key) == ours
+    for absent in ("bb2/none.toml", "", "bb2", "a" * 300, "$NOWHERE/x.toml"):
+        with pytest.raises(InputError, match=f"key {key}: no file"):
+            load_vehicle(written(tmp_path, "vehicles", "bb2", (name, absent)))
+    (tmp_path / "hulls").mkdir()
+    (tmp_path / "hulls" / "own.toml").write_text("")
+    monkeypatch.setenv("HULLS", str(tmp_path / "hulls"))
+    for present in ("hulls/own.toml", "$HULLS/own.toml"):
+        vehicle = load_vehicle(written(tmp_path, "vehicles", "bb2", (name, present)))
+        assert getattr(vehicle, key) == str(tmp_path / "hulls" / "own.toml")
+
+
 @pytest.mark.parametrize("limits", [[0.01, 0.02], [-5.0, -1.0]])
 def test_a_self_propulsion_state_beyond_the_propeller_is_none(tmp_path, limits):
     vehicle = load_vehicle(written(tmp_path, "vehicles", "bb2", ("[0.01, 10.0]", str(limits))))

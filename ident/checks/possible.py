@@ -15,6 +15,7 @@ from ident.captive.campaign import Campaign
 from ident.captive.run_table import MEASURED
 from ident.checks.findings import Evidence, Finding, Rule, check, kept, rows_of, together
 from sim.boat.catalogue import ACCELERATIONS
+from sim.boat.plausible import FRACTIONS
 
 # Files that hold runs when a campaign's source names them.
 _TABLES = frozenset((".csv", ".parquet", ".xlsx", ".xls", ".xlsb", ".ods", ".mat", ".h5", ".nc", ".tdms", ".lvm"))
@@ -42,6 +43,10 @@ def states_of_a_boat(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
         tip = math.pi * vehicle.diameter * runs["n"].abs()
         yield from _beyond(runs, rule, "n", tip, limits["tip"], "m/s at the tip of the propeller's blades")
     yield from _beyond(runs, rule, "D0", runs["D0"], limits["depth"], "m of depth")
+    yield from _beyond(runs, rule, "t", runs["t"].abs(), limits["fraction"], "of the thrust")
+    if "coefficient" in runs and "value" in runs:
+        of_hull = runs[runs["coefficient"].isin(list(FRACTIONS))]
+        yield from _beyond(of_hull, rule, "value", of_hull["value"].abs(), limits["fraction"], "of thrust or speed")
 
 
 def _beyond(runs: pd.DataFrame, rule: Rule, name: str, size: pd.Series, most: float, unit: str) -> Iterator[Finding]:

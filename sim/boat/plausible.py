@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -29,6 +29,13 @@ _MOTIONS = ("surge", "sway", "heave", "roll", "pitch", "yaw")
 _OUT_OF_TRIM = 0.5
 # Two positions are each other's mirror image when they differ by less than this part of the length.
 _SAME = 1e-3
+# What is taken from thrust or speed by the hull before the propeller.
+FRACTIONS = {
+    "t": "a part of the thrust",
+    "t_P": "a part of the thrust",
+    "w_T": "a part of the speed",
+    "w_P0": "a part of the speed",
+}
 
 
 def check_vehicle(vehicle: Any, where: str) -> None:
@@ -81,6 +88,30 @@ def check_mass(total: Any, added: Any, vehicle: Any) -> None:
     if not least > 0.0:
         text = "a mass matrix that is not positive definite"
         raise InputError(where, text, "added masses and levers of one body in water: its kinetic energy is above zero")
+
+
+def check_shares(values: Mapping[str, Any], vehicle: Any) -> None:
+    """Refuse thrust deductions and wake fractions that no propeller behind a hull has.
+
+    Of the thrust T the share 1 - t moves the boat, of its speed the share 1 - w reaches the propeller (ITTC
+    7.5-02-03-01.4): both above zero, or the propeller would push astern; a hull that adds as much as all of
+    either is none.
+
+    Parameters
+    ----------
+    values : Name of the coefficient -> its values.
+    vehicle : For the message.
+
+    Raises
+    ------
+    InputError
+        Naming the coefficient, its value and what is allowed.
+    """
+    for name in FRACTIONS:
+        for value in np.ravel(values.get(name, ())):
+            if not abs(value) < 1.0:
+                where = f"coefficients of vehicle {vehicle.name}, {name}"
+                raise InputError(where, f"{value:.3g}", f"above -1 and below 1, {FRACTIONS[name]}")
 
 
 def _faults(vehicle: Any) -> Iterator[tuple[str, str, str]]:

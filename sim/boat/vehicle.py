@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from importlib.resources import files
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -15,7 +16,7 @@ from sim.boat.stated import Length, Limits, Mass, Number, Place, Vector, in_unit
 from sim.files.errors import InputError
 from sim.files.frames import PROGRAM, Frame
 from sim.files.schema import Data, FrameData, Name, checked
-from sim.files.toml_files import read_toml
+from sim.files.toml_files import bundled, read_toml
 
 
 class Particulars(Data):
@@ -214,7 +215,9 @@ class Vehicle(Data):
     ``propeller`` may be left out of a bare hull: its terms are then out of the set, and flights ask for it.
     ``geometry`` names its surface (``sim.hull.surface``), waves need it; ``errata`` a table of what is
     printed wrong in its source and how it is applied (columns equation, printed, corrected,
-    consequence), shown in the report. Both are relative to the vehicle file.
+    consequence), shown in the report. They and ``terms`` are relative to the vehicle file, or one that is
+    bundled (``bb2/geometry.toml``), so that a copy of a bundled vehicle is whole; environment variables in them
+    are replaced.
 
     Attributes
     ----------
@@ -350,12 +353,17 @@ def load_vehicle(name: str | Path, beside: str | Path = "") -> Vehicle:
     vehicle = checked(Vehicle, data, where)
     vehicle.frame.declared(where)
     check_vehicle(vehicle, where)
-    folder = Path(where).parent if Path(where).suffix == ".toml" else Path(str(files("sim") / "vehicles"))
     for key in ("geometry", "errata", "terms"):
         if getattr(vehicle, key) is not None:
-            path = folder / getattr(vehicle, key)
-            # What decides loads is there from the start; pages and surfaces are asked for by what shows them.
-            if key == "terms" and not path.is_file():
-                raise InputError(f"{where}, key {key}", f"no file {getattr(vehicle, key)[:200]!r}", "a file beside it")
-            setattr(vehicle, key, str(path))
+            setattr(vehicle, key, _file_of(where, key, getattr(vehicle, key)))
     return vehicle.turned(PROGRAM)
+
+
+def _file_of(where: str, key: str, name: str) -> str:
+    """Path of a file that a vehicle file names: beside it, else bundled."""
+    ours = str(files("sim") / "vehicles")
+    for place in (ours if where in bundled("vehicles") else os.path.dirname(where), ours):
+        path = os.path.join(place, os.path.expandvars(name))
+        if os.path.isfile(path):
+            return path
+    raise InputError(f"{where}, key {key}", f"no file {name[:200]!r}", "a file beside it, or a bundled one")

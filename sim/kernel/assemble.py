@@ -16,7 +16,7 @@ from sim.boat.mass import (
     rigid_body_matrix,
     unit_added_masses,
 )
-from sim.boat.plausible import check_mass
+from sim.boat.plausible import check_mass, check_shares
 from sim.boat.vehicle import Vehicle
 from sim.files.errors import InputError
 from sim.kernel import layout
@@ -250,7 +250,7 @@ def assemble(coefficients: Coefficients, environment: Environment) -> Model:
     Raises
     ------
     InputError
-        As ``sim.boat.plausible.check_mass``.
+        As ``sim.boat.plausible.check_mass`` and ``check_shares``.
     """
     vehicle = coefficients.vehicle
     flat = _Flat(coefficients, environment)
@@ -262,6 +262,7 @@ def assemble(coefficients: Coefficients, environment: Environment) -> Model:
     added = added_mass_matrix(coefficients, environment)
     total = mass + added
     check_mass(total, added, vehicle)
+    check_shares({c.term.name: c.values for c in coefficients if not c.term.output}, vehicle)
     still = [OUTPUTS.index(o) for o in held(vehicle.term_set)]
     numbers = {
         "mass": particulars.mass.value,
