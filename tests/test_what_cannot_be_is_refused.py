@@ -11,7 +11,7 @@ from importlib.resources import files
 import pytest
 from click.testing import CliRunner
 
-from ident.calibration.file import load_calibration
+from ident.calibration.file import load_calibration, parameters
 from ident.cli import main
 from ident.validation.bands import fly_samples
 from sim.boat.coefficients import Coefficients
@@ -258,3 +258,65 @@ def test_a_result_that_is_no_number_is_no_success(tmp_path, number):
     assert not (tmp_path / "x.json").exists()
     with pytest.raises(InputError, match="metric overshoot_m"):
         _check_numbers({"overshoot_m": {"simulated": number, "CFD": None}}, "case.toml")
+
+
+TRAINING = '[[training]]\ncase = "hzz20"\nsource = "EXP"\n'
+STATED = 'method = "stated", mean = 1.0, sigma = 0.3, source = "made up"'
+
+
+def calibration(folder, *groups: str, training: str = TRAINING) -> str:
+    """A calibration file with groups of the keys that are given, each with a prior."""
+    made = [f'[[group]]\nname = "g{i}"\ntitle = "made up"\n{keys}\n' for i, keys in enumerate(groups)]
+    path = folder / "calibration.toml"
+    head = 'name = "made-up"\nvehicle = "bb2"\nsource = "made up"\n'
+    path.write_text(head + training + "\n".join(made))
+    return str(path)
+
+
+@pytest.mark.parametrize(
+    ("keys", "words"),
+    [
+        (f'terms = ["N_uvw"]\nprior = {{ {STATED.replace("1.0", "1000")} }}', "a multiplier is 0.1 to 10"),
+        (f'terms = ["N_uvw"]\nprior = {{ {STATED.replace("1.0", "1e-3")} }}', "a multiplier is 0.1 to 10"),
+        (f'terms = ["N_uvw"]\nprior = {{ {STATED.replace("0.3", "5e7")} }}', "sigma of 5e.07"),
+        (f'terms = ["N_uvw"]\nprior = {{ {STATED}, of = "roll" }}', "no key of"),
+        ('terms = ["Z_dB"]\nprior = { method = "carry_over", of = "pitch", source = "x" }', "'force' or 'roll'"),
+        (f'terms = ["N_uvw", "TRIAL"]\nprior = {{ {STATED} }}', "no value matches 'TRIAL'"),
+        (f'terms = ["N_uvw"]\nparts = ["hull", "rudder"]\nprior = {{ {STATED} }}', "no value matches 'rudder'"),
+        ('terms = ["N_uvw"]\nprior = { method = "version", sigma = 1e-6, source = "x" }', "widens"),
+    ],
+)
+def test_what_a_group_of_a_calibration_states_counts(tmp_path, rows, keys, words):
+    spec_path = calibration(tmp_path, keys)
+    with pytest.raises(InputError, match=words):
+        spec, where, _ = load_calibration(spec_path)
+        parameters(spec, load_vehicle("bb2"), rows, where)
+
+
+def test_a_mean_of_ones_own_stands_instead_of_the_methods(tmp_path, rows):
+    one = 'terms = ["N_uvw"]\nprior = { method = "version", mean = 1.2, sigma = 2.0, source = "x" }'
+    spec, where, _ = load_calibration(calibration(tmp_path, one))
+    (found,) = parameters(spec, load_vehicle("bb2"), rows, where)
+    assert (found.mean, found.sigma) == (1.2, 2.0)
+
+
+def test_two_groups_of_the_same_values_cannot_be_told_apart(tmp_path, rows):
+    same = f'terms = ["N_uvw"]\nprior = {{ {STATED} }}'
+    spec, where, _ = load_calibration(calibration(tmp_path, same, same.replace("N_uvw", "N_uv[w]")))
+    with pytest.raises(InputError, match="the same values as group g0"):
+        parameters(spec, load_vehicle("bb2"), rows, where)
+
+
+@pytest.mark.parametrize(
+    ("training", "words"),
+    [
+        (TRAINING + "share = 0.2\n", "differs_from"),
+        (TRAINING + 'differs_from = "EXP"\n', "itself"),
+        (TRAINING + TRAINING, "count twice"),
+        (TRAINING + TRAINING + 'channels = ["psi"]\n', "count twice"),
+    ],
+)
+def test_what_is_trained_on_is_stated_once(tmp_path, training, words):
+    group = f'terms = ["N_uvw"]\nprior = {{ {STATED} }}'
+    with pytest.raises(InputError, match=words):
+        load_calibration(calibration(tmp_path, group, training=training))

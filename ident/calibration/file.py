@@ -32,6 +32,10 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 # A multiplier further than this many captive standard errors from one needs another reason.
 ALLOWED = 2.0
+# A multiplier and its spread beyond this are another coefficient, or a slip of a unit.
+_MOST = 10.0
+# What each method has factors of; the others have one.
+_FACTORS = {"carry_over": ("force", "roll"), "tail_downwash": ("force", "pitch")}
 # What the column ``estimated_by`` says of an estimate that a prior would bring in once more.
 _IN_FORCE = {"carry_over": "carry_over x", "tail_downwash": "downwash x"}
 
@@ -56,6 +60,14 @@ class Training(Data):
     channels: list[str] | None = None
     differs_from: str | None = None
     share: Annotated[float, Field(ge=0, le=1)] = 0.5
+
+    @model_validator(mode="after")
+    def _shares_a_difference(self) -> Training:
+        if self.differs_from == self.source:
+            raise ValueError(f"differs_from is {self.source!r} itself")
+        if "share" in self.model_fields_set and self.differs_from is None:
+            raise ValueError("a share is of the difference to another source: differs_from is not given")
+        return self
 
 
 class Prior(Data):
@@ -86,6 +98,10 @@ class Prior(Data):
     def _stated_has_numbers(self) -> Prior:
         if self.method == "stated" and (self.mean is None or self.sigma is None):
             raise ValueError("a stated prior needs mean and sigma")
+        factors = _FACTORS.get(self.method, ())
+        if "of" in self.model_fields_set and self.of not in factors:
+            text = f"of = {' or '.join(map(repr, factors))}" if factors else "no key of"
+            raise ValueError(f"{text} with method {self.method!r}, not of = {self.of!r}")
         return self
 
 
@@ -119,8 +135,15 @@ class Group(Data):
 
     @model_validator(mode="after")
     def _multipliers_turn_nothing_around(self) -> Group:
-        if self.kind == "multiplier" and self.prior.mean is not None and self.prior.mean <= 0.0:
+        mean, sigma = self.prior.mean, self.prior.sigma
+        if self.kind == "offset":
+            return self
+        if mean is not None and mean <= 0.0:
             raise ValueError("a mean above zero: a multiplier of less turns a load around")
+        if mean is not None and not 1.0 / _MOST <= mean <= _MOST:
+            raise ValueError(f"a mean of {mean:g}: a multiplier is {1.0 / _MOST:g} to {_MOST:g}, and 1 changes nothing")
+        if sigma is not None and sigma > _MOST:
+            raise ValueError(f"a sigma of {sigma:g} of a multiplier: {_MOST:g} at most, which is 1000 % of the values")
         return self
 
 
@@ -155,6 +178,13 @@ class CalibrationFile(Data):
         twice = sorted({n for n in names if names.count(n) > 1})
         if twice:
             raise ValueError(f"group {twice[0]!r} stands twice")
+        learnt: set[tuple[str, str, str]] = set()
+        for one in self.training:
+            for channel in one.channels or ["*"]:
+                same = {(one.case, one.source, c) for c in (channel, "*")}
+                if same & learnt or (channel == "*" and any(k[:2] == (one.case, one.source) for k in learnt)):
+                    raise ValueError(f"training on {one.source} of {one.case} stands twice: it would count twice")
+                learnt.add((one.case, one.source, channel))
         return self
 
 
@@ -218,9 +248,15 @@ def load_calibration(name: str | Path) -> tuple[CalibrationFile, str, str]:
 
 
 def _rows_of(group: Group, rows: pd.DataFrame, where: str) -> Mask:
-    names, parts = rows["coefficient"].astype(str), rows["part"].astype(str)
-    chosen = np.array([any(fnmatchcase(n, t) for t in group.terms) for n in names])
-    chosen &= np.array([any(fnmatchcase(p, t) for t in group.parts) for p in parts])
+    chosen = np.ones(len(rows), dtype=bool)
+    for key, patterns, column in (("terms", group.terms, "coefficient"), ("parts", group.parts, "part")):
+        names = rows[column].astype(str)
+        matched = [names.map(lambda name, p=p: fnmatchcase(name, p)).to_numpy(dtype=bool) for p in patterns]
+        idle = next((p for p, hits in zip(patterns, matched, strict=True) if not hits.any()), None)
+        if idle is not None:
+            text = f"a pattern of {key} that the database version holds: {', '.join(sorted(set(names))[:12])} ..."
+            raise InputError(f"{where}, group {group.name}, key {key}", f"no value matches {idle!r}", text)
+        chosen &= np.any(matched, axis=0)
     columns = {axis: column for column, axis in axis_columns().items()}
     least = dict.fromkeys(group.nonzero, 0.0) | group.at_least
     for axis, size in least.items():
@@ -289,8 +325,12 @@ def _prior(
             raise InputError(f"{where}, group {group.name}, key prior.method", repr(prior.method), text)
         mean, spread, method = _estimated(prior, vehicle, rows)
         sigma = float(np.hypot(spread, mean * captive))
-    if prior.sigma is not None and prior.method != "stated":
-        sigma = max(sigma, prior.sigma)
+    if prior.method != "stated":
+        mean = mean if prior.mean is None else prior.mean
+        if prior.sigma is not None and prior.sigma < sigma:
+            text = f"above {sigma:.3g}, which {method} has already: sigma widens it; else leave it out"
+            raise InputError(f"{where}, group {group.name}, key prior.sigma", f"{prior.sigma:g}", text)
+        sigma = sigma if prior.sigma is None else prior.sigma
     if sigma <= 0.0:
         raise InputError(f"{where}, group {group.name}", "a prior without any spread", "prior.sigma, positive")
     return mean, sigma, method
@@ -307,8 +347,8 @@ def parameters(spec: CalibrationFile, vehicle: Vehicle, rows: pd.DataFrame, wher
     Raises
     ------
     InputError
-        For a group without rows, one that splits a value from its mirror image, or a prior
-        without spread.
+        For a pattern that matches nothing, a group without rows or with those of another one, one that splits a
+        value from its mirror image, a prior without spread, or a sigma below what the method states.
     """
     chosen_parameters = []
     for group in spec.group:
@@ -316,6 +356,10 @@ def parameters(spec: CalibrationFile, vehicle: Vehicle, rows: pd.DataFrame, wher
         _whole_estimates(group, rows, chosen, where)
         captive = captive_sigma(rows, chosen, group.kind)
         mean, sigma, method = _prior(group, captive, vehicle, rows, chosen, where)
+        for other in chosen_parameters:
+            if other.group.kind == group.kind and (other.rows == chosen).all():
+                text = f"the same values as group {other.group.name}"
+                raise InputError(f"{where}, group {group.name}", text, "values that no other group of its kind is of")
         chosen_parameters.append(Parameter(group, chosen, mean, sigma, captive, method))
     return chosen_parameters
 

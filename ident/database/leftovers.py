@@ -108,7 +108,7 @@ def vacuum(path: str, wait: float = WAIT, dry_run: bool = False) -> dict[str, in
         raise InputError(path, f"cannot be written: {error}", "a folder you may write to") from error
 
 
-def check_folder(folder: Path) -> None:
+def check_foreign(folder: Path) -> None:
     """Refuse a folder that holds data of something else. Raises ``InputError``."""
     if not folder.is_dir() or (folder / LOCK).exists() or has_versions(str(folder)):
         return

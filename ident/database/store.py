@@ -16,10 +16,11 @@ from numpy.typing import NDArray
 
 from ident import __version__
 from ident.captive.published import TEST as PUBLISHED
-from ident.database.leftovers import check_folder, remove_unfinished
+from ident.database.leftovers import check_foreign, remove_unfinished
 from ident.database.lock import WAIT, held
 from ident.identification.identify import Identification
 from ident.identification.nodes import Node
+from ident.output import check_folder
 from sim.boat.database import (
     NUMBERS,
     OPTIONAL,
@@ -36,6 +37,7 @@ from sim.boat.delta_log import LATEST, LOG, Entry, Log, has_versions, latest_sai
 from sim.boat.parts import Point, parts_of, vehicle_terms
 from sim.boat.row_codec import correlation_texts
 from sim.files.errors import InputError
+from sim.files.standard_error import without_panics
 from sim.files.storage import address, brief, engine, flush, is_url, written_to
 
 # Delta Lake's own housekeeping would delete the log of old versions, and then their data.
@@ -178,7 +180,9 @@ def commit(path: str, rows: pd.DataFrame, metadata: dict[str, str], wait: float 
     local = Path(path)
     if local.exists() and not local.is_dir():
         raise InputError(path, "a file", "a folder for the database")
-    check_folder(local)
+    check_foreign(local)
+    for folder in (local, local / LOG):
+        check_folder(folder)
     try:
         local.mkdir(parents=True, exist_ok=True)
         # Creating a table is not exclusive in Delta Lake; the lock falls with its process.
@@ -266,7 +270,7 @@ def _written(path: str, rows: pd.DataFrame, said: dict[str, str], how: dict[str,
     with engine(path, "the version cannot be written", "room, and a path you may write to"):
         try:
             # Never tried again on top of what another wrote meanwhile: what it replaces would be another's.
-            with written_to(path) as place:
+            with written_to(path) as place, without_panics():
                 write_deltalake(
                     place,
                     arrow(rows),

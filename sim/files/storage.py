@@ -21,6 +21,9 @@ def is_url(path: str) -> bool:
 # What the storage engine takes for something else in the address of a folder, or does not take at all.
 _MISREAD = re.compile(r"[\[\]\\^|\x00-\x1f\x7f\ud800-\udfff]|%[0-9A-Fa-f]{2}")
 
+# Sequences that colour a terminal.
+_COLOUR = re.compile(r"\x1b\[[0-9;]*m")
+
 
 def address(path: str) -> str:
     """Address of a database for the storage engine: a URL, in which ``#``, ``?`` and blanks are themselves.
@@ -85,8 +88,8 @@ def _mirror(path: str) -> Iterator[None]:
 
 def brief(error: BaseException) -> str:
     """What the storage engine says, in one line and without its own trace."""
-    lines = str(error).split("   0: ")[0].splitlines()
-    return " ".join(line.strip(" \t↳") for line in lines if line.strip())[:300]
+    lines = _COLOUR.sub("", str(error)).split("   0: ")[0].splitlines()
+    return ": ".join(" ".join(line.strip(" \t↳") for line in lines if line.strip()).split(" ↳ "))[:300]
 
 
 @contextlib.contextmanager
