@@ -13,6 +13,8 @@ from click.testing import CliRunner
 
 from ident.calibration.file import load_calibration, parameters
 from ident.cli import main
+from ident.trials.maneuvers import stated
+from ident.trials.spec import load_spec
 from ident.validation.bands import fly_samples
 from sim.boat.coefficients import Coefficients
 from sim.boat.mass import Environment
@@ -287,10 +289,14 @@ def calibration(folder, *groups: str, training: str = TRAINING) -> str:
     ],
 )
 def test_what_a_group_of_a_calibration_states_counts(tmp_path, rows, keys, words):
-    spec_path = calibration(tmp_path, keys)
+    path = calibration(tmp_path, keys)
+
+    def read():
+        spec, where, _ = load_calibration(path)
+        return parameters(spec, load_vehicle("bb2"), rows, where)
+
     with pytest.raises(InputError, match=words):
-        spec, where, _ = load_calibration(spec_path)
-        parameters(spec, load_vehicle("bb2"), rows, where)
+        read()
 
 
 def test_a_mean_of_ones_own_stands_instead_of_the_methods(tmp_path, rows):
@@ -320,3 +326,17 @@ def test_what_is_trained_on_is_stated_once(tmp_path, training, words):
     group = f'terms = ["N_uvw"]\nprior = {{ {STATED} }}'
     with pytest.raises(InputError, match=words):
         load_calibration(calibration(tmp_path, group, training=training))
+
+
+@pytest.mark.parametrize("key", ["scale = 1e-300", "[noise]\nheading_deg = 100", "[noise]\nspeed_mps = 1e7"])
+def test_scales_and_noise_that_no_trial_has_are_refused(tmp_path, key):
+    path = tmp_path / "trial.toml"
+    path.write_text(key + "\n")
+    with pytest.raises(InputError, match=key.split("\n")[-1].split(" =")[0]):
+        load_spec(path)
+
+
+@pytest.mark.parametrize("words", ["zigzag 0/10", "zigzag 10/0", "vertical_zigzag 10/1000"])
+def test_a_zigzag_without_an_angle_is_none(words):
+    with pytest.raises(InputError, match="above 0"):
+        stated(words)

@@ -350,7 +350,7 @@ def parameters(spec: CalibrationFile, vehicle: Vehicle, rows: pd.DataFrame, wher
         For a pattern that matches nothing, a group without rows or with those of another one, one that splits a
         value from its mirror image, a prior without spread, or a sigma below what the method states.
     """
-    chosen_parameters = []
+    chosen_parameters: list[Parameter] = []
     for group in spec.group:
         chosen = _rows_of(group, rows, where)
         _whole_estimates(group, rows, chosen, where)

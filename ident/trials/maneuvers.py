@@ -80,7 +80,10 @@ def stated(text: str) -> Maneuver:
         if not angles:
             raise InputError("maneuver", repr(text), "a zigzag with rudder and check angle: zigzag 20/20")
         kind = "vertical_zigzag" if "vert" in low or "vzz" in low or "depth" in low else "zigzag"
-        return Maneuver(kind, float(angles[1]), float(angles[2]))
+        execute, check = float(angles[1]), float(angles[2])
+        if not (0.0 < execute <= 90.0 and 0.0 < check <= 90.0):
+            raise InputError("maneuver", repr(text), "rudder and check angle above 0, at most 90 deg")
+        return Maneuver(kind, execute, check)
     words = {"turn": "turning_circle"}
     words |= {"spiral": "direct_spiral", "pull": "pull_out", "stop": "stopping"}
     words |= {"roll": "roll_decay", "rise": "rise", "max q": "rise", "surfac": "rise", "depth": "depth_change"}

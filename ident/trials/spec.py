@@ -13,6 +13,11 @@ from sim.files.schema import Data, FrameData, checked
 from sim.files.toml_files import read_toml
 
 Positive = Annotated[float, Field(gt=0, le=1e9)]
+# Of a model's thousandth and of its thousandfold: beyond, a scale is a slip.
+Scale = Annotated[float, Field(ge=1e-3, le=1e3)]
+# A quarter turn or twice the fastest submarine is no noise of an instrument.
+AngleNoise = Annotated[float, Field(gt=0, le=90)]
+SpeedNoise = Annotated[float, Field(gt=0, le=50)]
 Axis = Literal["north", "east", "south", "west"]
 
 
@@ -66,13 +71,13 @@ class Noise(Data):
     speed_mps : Of the speed [m/s].
     """
 
-    heading_deg: Positive | None = None
-    pitch_deg: Positive | None = None
-    roll_deg: Positive | None = None
-    yaw_rate_degps: Positive | None = None
+    heading_deg: AngleNoise | None = None
+    pitch_deg: AngleNoise | None = None
+    roll_deg: AngleNoise | None = None
+    yaw_rate_degps: AngleNoise | None = None
     position_m: Positive | None = None
     depth_m: Positive | None = None
-    speed_mps: Positive | None = None
+    speed_mps: SpeedNoise | None = None
 
 
 class Current(Data):
@@ -128,7 +133,7 @@ class TrialFile(Data):
     execute_s: float | None = None
     initial: Start = Field(default_factory=Start)
     axes: EarthAxes | None = None
-    scale: Positive = 1.0
+    scale: Scale = 1.0
     frame: FrameData | None = None
     wrap_deg: Literal[180, 360] | None = None
     noise: Noise = Field(default_factory=Noise)
