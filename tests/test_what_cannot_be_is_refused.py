@@ -306,13 +306,6 @@ def test_a_mean_of_ones_own_stands_instead_of_the_methods(tmp_path, rows):
     assert (found.mean, found.sigma) == (1.2, 2.0)
 
 
-def test_two_groups_of_the_same_values_cannot_be_told_apart(tmp_path, rows):
-    same = f'terms = ["N_uvw"]\nprior = {{ {STATED} }}'
-    spec, where, _ = load_calibration(calibration(tmp_path, same, same.replace("N_uvw", "N_uv[w]")))
-    with pytest.raises(InputError, match="the same values as group g0"):
-        parameters(spec, load_vehicle("bb2"), rows, where)
-
-
 @pytest.mark.parametrize(
     ("training", "words"),
     [

@@ -347,8 +347,8 @@ def parameters(spec: CalibrationFile, vehicle: Vehicle, rows: pd.DataFrame, wher
     Raises
     ------
     InputError
-        For a pattern that matches nothing, a group without rows or with those of another one, one that splits a
-        value from its mirror image, a prior without spread, or a sigma below what the method states.
+        For a pattern that matches nothing, a group without rows, one that splits a value from its mirror image,
+        a prior without spread, or a sigma below what the method states.
     """
     chosen_parameters: list[Parameter] = []
     for group in spec.group:
@@ -356,10 +356,6 @@ def parameters(spec: CalibrationFile, vehicle: Vehicle, rows: pd.DataFrame, wher
         _whole_estimates(group, rows, chosen, where)
         captive = captive_sigma(rows, chosen, group.kind)
         mean, sigma, method = _prior(group, captive, vehicle, rows, chosen, where)
-        for other in chosen_parameters:
-            if other.group.kind == group.kind and (other.rows == chosen).all():
-                text = f"the same values as group {other.group.name}"
-                raise InputError(f"{where}, group {group.name}", text, "values that no other group of its kind is of")
         chosen_parameters.append(Parameter(group, chosen, mean, sigma, captive, method))
     return chosen_parameters
 
