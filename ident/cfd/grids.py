@@ -59,18 +59,20 @@ def box(template: Template, surface: Mesh, length: float, grid: str, surface_z: 
     Returns
     -------
     Box
-        The background's cells are stretched by less than their share of the domain so that they end on its sides,
-        which are the same in all grids.
+        Cells have their stated length in every grid, so that lengths of successive grids have the stated ratio. The
+        sides of the domain, ``extent`` lengths off or up to two cells more, therefore differ by less than that.
     """
     wall = wall_cell(template, length, grid)
     back = wall * 2**template.grid.levels
     middle = 0.5 * (surface.vertices.min(axis=0) + surface.vertices.max(axis=0))
     reach = template.grid.extent * length
-    low, high = middle - reach, middle + reach
+    # Whole cells either way: in all grids the middle of the boat lies between cells, not in one grid within them.
+    half = math.ceil(reach / back - 1e-9) * back
+    low, high = middle - half, middle + half
     if surface_z is not None:
         low[2] = surface_z
-    # An even number: in all grids the middle of the boat lies between cells, not in one grid within them.
-    cells = tuple(2 * math.ceil((b - a) / back / 2.0 - 1e-9) for a, b in zip(low, high, strict=True))
+        high[2] = surface_z + math.ceil((middle[2] + reach - surface_z) / back - 1e-9) * back
+    cells = tuple(round((b - a) / back) for a, b in zip(low, high, strict=True))
     return Box(tuple(map(float, low)), tuple(map(float, high)), cells, wall, surface_z is not None)  # type: ignore[arg-type]
 
 
@@ -146,10 +148,27 @@ def _layers(template: Template, patches: list[str]) -> dict[str, Any]:
     }
 
 
+def refinement_bands(levels: int, wall: float, near: float) -> list[list[float]]:
+    """Distance from the walls [m] up to which each level is refined, finest first.
+
+    Walls have the level ``levels``, ``near`` has one less, and so on, twice as far each. No distance is less than the
+    length of the cells that are to be halved: a cell through which a wall passes has its centre within 0.87 of that.
+    A test of edges against the surface alone leaves out walls that pass between the centres of coarse cells.
+
+    Examples
+    --------
+    >>> refinement_bands(2, 0.1, 0.5)
+    [[0.2, 2], [0.5, 1]]
+    """
+    bands = [[2.0 * wall, levels]]
+    bands += [[max(near * 2.0**k, 2.0 ** (k + 2) * wall), levels - 1 - k] for k in range(levels - 1)]
+    return bands
+
+
 def snappy(template: Template, patches: list[str], domain: Box, length: float) -> dict[str, Any]:
-    """``system/snappyHexMeshDict``: ``levels`` on the walls, one less up to ``reach``, and so on, twice as far each."""
-    levels, near = template.grid.levels, settings()["reach"] * length
-    bands = [[near * 2**k, levels - 1 - k] for k in range(levels - 1)]
+    """``system/snappyHexMeshDict``: ``levels`` on the walls and coarser with the distance from them."""
+    levels = template.grid.levels
+    bands = refinement_bands(levels, domain.wall, settings()["reach"] * length)
     walls = {name: {"level": [levels, levels], "patchInfo": {"type": "wall"}} for name in patches}
     return {
         "castellatedMesh": True,
@@ -164,7 +183,7 @@ def snappy(template: Template, patches: list[str], domain: Box, length: float) -
             "features": [],
             "refinementSurfaces": walls,
             "resolveFeatureAngle": 30,
-            "refinementRegions": {name: {"mode": "distance", "levels": bands} for name in patches} if bands else {},
+            "refinementRegions": {name: {"mode": "distance", "levels": bands} for name in patches},
             "locationInMesh": domain.inside,
             "allowFreeStandingZoneFaces": False,
         },
