@@ -79,8 +79,9 @@ def test_spheroid_from_lines_to_derivatives(tmp_path):
     }
     for name, value in wanted.items():
         print(f"{name:8s} {values[name]:10.6f} +- {errors[name]:.6f}, potential {value:10.6f}")
-    for name, value in wanted.items():
-        assert abs(values[name] - value) < 3.0 * errors[name], name
-    # The moment of Munk and added mass in sway are large, and known far better than that.
-    for name in ("N_v", "Y_vdot"):
-        assert values[name] == pytest.approx(wanted[name], rel=0.1)
+    # N_v comes out of two angles beside N_v|v|, and its grids oscillate: half their span says less than is missing
+    # (docs/lines-to-runs.md). It is held as the large loads are, to a tenth.
+    for name in wanted.keys() - {"N_v"}:
+        assert abs(values[name] - wanted[name]) < 3.0 * errors[name], name
+    for name in ("N_v", "X_udot", "Y_vdot", "N_rdot"):
+        assert values[name] == pytest.approx(wanted[name], rel=0.1), name
