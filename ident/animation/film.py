@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -375,8 +376,10 @@ def animate(
     # The film's figure holds each picture as an image: drawing all axes anew takes ten times as long.
     screen = Figure(figsize=_SIZE, dpi=_DPI)
     FigureCanvasAgg(screen)
+    # A writer without any picture fails at its end, in the place of the signal that ended the film.
+    first = next(pictures)
     with whole(path) as part, writer.saving(screen, str(part), _DPI):
-        for picture in pictures:
+        for picture in chain((first,), pictures):
             screen.images.clear()
             screen.figimage(picture)
             writer.grab_frame()
