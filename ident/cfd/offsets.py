@@ -133,26 +133,26 @@ def offsets_of(
     _right_length(surface, float(np.ptp(every)), length, unit)
     body, members = closed_bodies(surface, patches)
     if len(members) > 1:
-        found = f"{len(members)} closed bodies: {', '.join('+'.join(sorted(m)) for m in members)}"[:200]
-        raise InputError(str(surface), found, "the hull alone; sail and planes are parts of the geometry file")
+        wrong = f"{len(members)} closed bodies: {', '.join('+'.join(sorted(m)) for m in members)}"[:200]
+        raise InputError(str(surface), wrong, "the hull alone; sail and planes are parts of the geometry file")
     nose, tail = float(body.vertices[:, 0].max()), float(body.vertices[:, 0].min())
     x = 0.5 * (1.0 - np.cos(np.linspace(0.0, np.pi, _STATIONS))) * (nose - tail)
     radius = np.stack([_radii(body, nose - min(max(s, _END * x[-1]), (1.0 - _END) * x[-1]), surface) for s in x])
     _ended(body, radius, nose, tail)
     volume = _volume(x, radius)
     if abs(volume / body.volume - 1.0) > _VOLUME:
-        found = f"{volume:.5g} m3 by polar sections, {body.volume:.5g} m3 by the surface"
-        raise InputError(str(surface), found, "a hull whose sections each ray from the axis leaves once, without sail")
+        wrong = f"{volume:.5g} m3 by polar sections, {body.volume:.5g} m3 by the surface"
+        raise InputError(str(surface), wrong, "a hull whose sections each ray from the axis leaves once, without sail")
     centre = float(nose - body.centroid[0])
     return Offsets(x, _ANGLES, radius, volume, float(body.volume), centre, str(surface))
 
 
-def _right_length(surface: Path, found: float, wanted: float, unit: str) -> None:
-    if abs(found / wanted - 1.0) <= _LENGTH:
+def _right_length(surface: Path, length: float, wanted: float, unit: str) -> None:
+    if abs(length / wanted - 1.0) <= _LENGTH:
         return
-    fits = [u for u, size in UNITS.items() if abs(found / UNITS[unit] * size / wanted - 1.0) <= _LENGTH]
+    fits = [u for u, size in UNITS.items() if abs(length / UNITS[unit] * size / wanted - 1.0) <= _LENGTH]
     text = f"--unit {fits[0]}" if fits else f"a surface as long as --length says, {wanted:g} m"
-    raise InputError(str(surface), f"{found:.6g} m long with --unit {unit}", text)
+    raise InputError(str(surface), f"{length:.6g} m long with --unit {unit}", text)
 
 
 def _radii(body: Mesh, at: float, surface: Path) -> Array:
@@ -169,13 +169,13 @@ def _radii(body: Mesh, at: float, surface: Path) -> Array:
     # A corner belongs to both of its edges, so that no ray passes between them.
     hit = (along >= -1e-9) & (along <= 1.0 + 1e-9) & (far > 0.0) & (cross != 0.0)
     if not hit.any(axis=1).all():
-        found = f"the axis lies outside of the section at x = {at:.4g} m of the surface turned ahead"
-        raise InputError(str(surface), found, "--axis, a height that all sections contain")
+        wrong = f"the axis lies outside of the section at x = {at:.4g} m of the surface turned ahead"
+        raise InputError(str(surface), wrong, "--axis, a height that all sections contain")
     both = np.where(hit, far, 0.0).max(axis=1).reshape(2, -1)
     widest = float(np.abs(body.vertices[:, 1:]).max())
     if np.abs(both[0] - both[1]).max() > _SYMMETRY * widest:
-        found = f"port and starboard differ by {np.abs(both[0] - both[1]).max():.3g} m at a section"
-        raise InputError(str(surface), found, "a hull that is the same to both sides of y = 0")
+        wrong = f"port and starboard differ by {np.abs(both[0] - both[1]).max():.3g} m at a section"
+        raise InputError(str(surface), wrong, "a hull that is the same to both sides of y = 0")
     return np.asarray(both.mean(axis=0))
 
 

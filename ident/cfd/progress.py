@@ -77,8 +77,8 @@ class Progress:
         again = {s.run_id: s for s in reversed(self.states) if s.word == "done"}
         for name, why in self.unconverged.items():
             if name in again and name in steady:
-                own = [s for s in self.states if s.run_id == name and (f"{s.grid}:" in why)]
-                out += [(f"{s.folder}/Allrun {steady[name] // 2}", why) for s in own]
+                states_of_run = [s for s in self.states if s.run_id == name and (f"{s.grid}:" in why)]
+                out += [(f"{s.folder}/Allrun {steady[name] // 2}", why) for s in states_of_run]
         return out
 
     def to_dict(self) -> dict[str, Any]:
@@ -105,11 +105,11 @@ def progress(matrix: Matrix, campaign: Campaign) -> Progress:
         if case.run_id not in back:
             continue
         if not case.iterations:
-            found = back[case.run_id].fit
-            why = "" if found.converged else found.verdict
+            fitted = back[case.run_id].fit
+            why = "" if fitted.converged else fitted.verdict
         else:
-            own = (_settled(matrix.folder / "cases" / case.run_id / grid, case) for grid in case.grids)
-            why = "; ".join(text for text in own if text)
+            verdicts = (_settled(matrix.folder / "cases" / case.run_id / grid, case) for grid in case.grids)
+            why = "; ".join(text for text in verdicts if text)
         if why:
             unconverged[case.run_id] = why
     return Progress(matrix, states, unconverged)
@@ -137,24 +137,24 @@ def _settled(folder: Path, case: Case) -> str:
 
 def _state(root: Path, case: Case, grid: str) -> State:
     folder = root / "cases" / case.run_id / grid
-    own: Callable[..., State] = lambda word, **more: State(case.run_id, grid, folder, word, **more)  # noqa: E731
+    state: Callable[..., State] = lambda word, **more: State(case.run_id, grid, folder, word, **more)  # noqa: E731
     try:
         words = (folder / "state").read_text(encoding="utf-8").split()
     except OSError:
         # Output without a state was written by other means than Allrun.
-        return own("done", share=1.0) if (folder / "postProcessing").is_dir() else own("waiting")
+        return state("done", share=1.0) if (folder / "postProcessing").is_dir() else state("waiting")
     if words[:1] == ["done"]:
-        return own("done", share=1.0)
+        return state("done", share=1.0)
     step = words[1] if len(words) > 1 else "start"
     log = folder / f"log.{step}"
     if step == "mesh":
         log = _log_of_mesh(root / "meshes" / case.mesh / grid)
     share = _share(log, case)
     if words[:1] == ["failed"]:
-        return own("died", step=step, share=share, end=_last_lines(log))
+        return state("died", step=step, share=share, end=_last_lines(log))
     if _stopped(words, log, folder):
-        return own("stopped", step=step, share=share, end=_last_lines(log))
-    return own("running", step=step, share=share)
+        return state("stopped", step=step, share=share, end=_last_lines(log))
+    return state("running", step=step, share=share)
 
 
 def _stopped(words: list[str], log: Path, folder: Path) -> bool:

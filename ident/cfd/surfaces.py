@@ -90,15 +90,15 @@ def read_surface(path: Path, template: Template, vehicle: Vehicle, where: str) -
     """
     raw = read_patches(path)
     _named(path, set(raw), template, vehicle, where)
-    own = template.surface
-    signs = np.array([own.frame.signs[a] for a in "xyz"], dtype=float)
+    drawn = template.surface
+    signs = np.array([drawn.frame.signs[a] for a in "xyz"], dtype=float)
     hand = int(np.prod(signs))
     if hand < 0:
         raise InputError(f"{where}, key surface", "left-handed axes", "right-handed axes of the surface")
-    to_metres = UNITS[own.unit]
+    to_metres = UNITS[drawn.unit]
     patches = {
         name: Mesh(
-            (vertices - np.array(own.origin)) * signs * to_metres, triangles, np.zeros(len(triangles), int), (name,)
+            (vertices - np.array(drawn.origin)) * signs * to_metres, triangles, np.zeros(len(triangles), int), (name,)
         )
         for name, (vertices, triangles) in raw.items()
     }
@@ -108,9 +108,9 @@ def read_surface(path: Path, template: Template, vehicle: Vehicle, where: str) -
     lines = Lines(patches, body, members, tuple(_numbers(lines, template, vehicle)))
     for one in lines.checks:
         if one.off > one.tolerance:
-            found = f"{one.name}: {one.surface:.5g} of the surface, {one.vehicle:.5g} of vehicle {vehicle.name}"
+            wrong = f"{one.name}: {one.surface:.5g} of the surface, {one.vehicle:.5g} of vehicle {vehicle.name}"
             text = f"a difference of {one.tolerance:g} at most; [tolerances] of {where} where the surface is right"
-            raise InputError(str(path), found, text)
+            raise InputError(str(path), wrong, text)
     return lines
 
 
@@ -119,11 +119,11 @@ def read_patches(path: Path) -> dict[str, tuple[Array, NDArray[np.int64]]]:
     trimesh = library("trimesh", "cfd", "surface")
     paths = sorted(path.glob("*.stl")) if path.is_dir() else [path]
     if not paths or not all(p.is_file() and p.suffix.lower() == ".stl" for p in paths):
-        found = (
+        wrong = (
             "no .stl file in the folder" if path.is_dir() else "not a .stl file" if path.is_file() else "no such file"
         )
         raise InputError(
-            str(path), found, "an STL file with a solid for each patch, or a folder with an STL file for each"
+            str(path), wrong, "an STL file with a solid for each patch, or a folder with an STL file for each"
         )
     patches = {}
     for one in paths:
@@ -150,17 +150,17 @@ def read_patches(path: Path) -> dict[str, tuple[Array, NDArray[np.int64]]]:
     return patches
 
 
-def _named(path: Path, found: set[str], template: Template, vehicle: Vehicle, where: str) -> None:
+def _named(path: Path, named: set[str], template: Template, vehicle: Vehicle, where: str) -> None:
     """Every part is the vehicle's, every patch of a part is in the file, and every patch in a part."""
     for part in template.parts:
         if part not in vehicle.part_names():
             raise InputError(f"{where}, key parts.{part}", "no part of the vehicle", ", ".join(vehicle.part_names()))
-    wanted = {patch: part for part, own in template.parts.items() for patch in own}
+    wanted = {patch: part for part, patches in template.parts.items() for patch in patches}
     for patch, part in wanted.items():
-        if patch not in found:
-            text = f"one of {', '.join(sorted(found))}: the solids of the file"
+        if patch not in named:
+            text = f"one of {', '.join(sorted(named))}: the solids of the file"
             raise InputError(f"{where}, key parts.{part}", f"patch {patch!r}, which {path} does not have", text)
-    for patch in sorted(found):
+    for patch in sorted(named):
         if patch not in wanted:
             raise InputError(str(path), f"patch {patch!r} that no part has", f"every patch in [parts] of {where}")
 
@@ -169,22 +169,21 @@ def _right_unit(path: Path, patches: dict[str, Mesh], template: Template, vehicl
     """The length in the stated unit is the vehicle's; the message names the unit that would fit."""
     every = np.concatenate([p.vertices[:, 0] for p in patches.values()])
     wanted = vehicle.particulars.length.value
-    found = float(np.ptp(every)) * template.surface.ratio
-    if abs(found / wanted - 1.0) <= template.tolerances.length:
+    length = float(np.ptp(every)) * template.surface.ratio
+    if abs(length / wanted - 1.0) <= template.tolerances.length:
         return
-    drawn = found / UNITS[template.surface.unit]
+    drawn = length / UNITS[template.surface.unit]
     fits = [u for u, size in UNITS.items() if abs(drawn * size / wanted - 1.0) <= template.tolerances.length]
     hint = (
         f"unit = {fits[0]!r}, "
         if fits
-        else f"a ratio of {template.surface.ratio * wanted / found:.5g}, "
-        if found
+        else f"a ratio of {template.surface.ratio * wanted / length:.5g}, "
+        if length
         else ""
     )
     text = f"{hint}or a surface as long as vehicle {vehicle.name}, {wanted:g} m"
-    what = (
-        f"{found:.6g} m long at full scale with unit = {template.surface.unit!r} and ratio = {template.surface.ratio:g}"
-    )
+    stated = f"unit = {template.surface.unit!r} and ratio = {template.surface.ratio:g}"
+    what = f"{length:.6g} m long at full scale with {stated}"
     raise InputError(f"{path}, by {where}, key surface.unit", what, text)
 
 
@@ -207,22 +206,22 @@ def closed_bodies(path: Path, patches: dict[str, Mesh]) -> tuple[Mesh, tuple[fro
     ends = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]]])
     graph = coo_matrix((np.ones(len(ends)), (ends[:, 0], ends[:, 1])), shape=(len(vertices),) * 2)
     _, label = connected_components(graph, directed=False)
-    own = label[triangles[:, 0]]
+    body_of = label[triangles[:, 0]]
     parts: list[Mesh] = []
     members: list[frozenset[str]] = []
-    for k in np.unique(own):
-        t = triangles[own == k]
-        used = frozenset(names[i] for i in np.unique(patch[own == k]))
+    for k in np.unique(body_of):
+        t = triangles[body_of == k]
+        used = frozenset(names[i] for i in np.unique(patch[body_of == k]))
         name = f"{'+'.join(sorted(used))} ({len(parts) + 1})"
         whole = Mesh(vertices, t, np.zeros(len(t), dtype=np.int64), (name,))
         try:
             whole.check(str(path))
         except MeshError as error:
             text = "a closed surface, every triangle counter-clockwise seen from the water"
-            found = str(error).removeprefix(f"{path}, ")
-            if "open" in found:
-                found += " (a hole, or a triangle turned inside out)"
-            raise InputError(str(path), found, text) from error
+            wrong = str(error).removeprefix(f"{path}, ")
+            if "open" in wrong:
+                wrong += " (a hole, or a triangle turned inside out)"
+            raise InputError(str(path), wrong, text) from error
         parts.append(whole)
         members.append(used)
     return joined(parts), tuple(members)
@@ -230,16 +229,16 @@ def closed_bodies(path: Path, patches: dict[str, Mesh]) -> tuple[Mesh, tuple[fro
 
 def _numbers(lines: Lines, template: Template, vehicle: Vehicle) -> list[Check]:
     """Length, volume, centroid, wetted area, section areas and added mass at full scale."""
-    ratio, allowed, own = template.surface.ratio, template.tolerances, vehicle.particulars
-    length = own.length.value
+    ratio, allowed, particulars = template.surface.ratio, template.tolerances, vehicle.particulars
+    length = particulars.length.value
     wet = wetted_panels(lines.body) if len(lines.members) > 1 else lines.body
-    found = lines.length * ratio
-    out = [Check("length [m]", found, length, abs(found / length - 1.0), allowed.length)]
-    displaced = own.displaced_mass.value / template.fluid.density_kgpm3
+    measured = lines.length * ratio
+    out = [Check("length [m]", measured, length, abs(measured / length - 1.0), allowed.length)]
+    displaced = particulars.displaced_mass.value / template.fluid.density_kgpm3
     volume = wet.volume * ratio**3
     out.append(Check("volume [m3]", volume, displaced, abs(volume / displaced - 1.0), allowed.volume))
     centre = wet.centroid * ratio
-    for axis, mine, theirs in zip("xyz", centre, own.centre_of_buoyancy.value, strict=True):
+    for axis, mine, theirs in zip("xyz", centre, particulars.centre_of_buoyancy.value, strict=True):
         out.append(Check(f"centroid {axis} [m]", mine, theirs, abs(mine - theirs) / length, allowed.centroid))
     out.append(Check("wetted area [m2]", float(np.linalg.norm(wet.areas, axis=1).sum()) * ratio**2))
     other = None if vehicle.geometry is None else read_geometry(vehicle.geometry)

@@ -145,7 +145,7 @@ def same_slope(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
     for test, (angle, force, moment) in _PLANES.items():
         groups = list(_groups(evidence, test, angle))
         for output in (force, moment):
-            found: list[tuple[str, pd.DataFrame, float, float]] = []
+            slopes: list[tuple[str, pd.DataFrame, float, float]] = []
             # The same range of angles, for a curved load has no one slope.
             reach = [float(g[angle].abs()[kept(g, output)].max()) for _, g in groups]
             reach = [r for r in reach if r > 0.0]
@@ -153,18 +153,18 @@ def same_slope(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
             for words, group in groups:
                 slope, error = _slope(group, angle, output, body, widest)
                 if math.isfinite(slope):
-                    found.append((words, group, slope, error))
-            yield from _compared(evidence, rule, output, angle, found)
+                    slopes.append((words, group, slope, error))
+            yield from _compared(evidence, rule, output, angle, slopes)
 
 
 def _compared(
-    evidence: Evidence, rule: Rule, output: str, angle: str, found: list[tuple[str, pd.DataFrame, float, float]]
+    evidence: Evidence, rule: Rule, output: str, angle: str, slopes: list[tuple[str, pd.DataFrame, float, float]]
 ) -> Iterator[Finding]:
     """Slopes against that of the most runs."""
-    if len(found) < 2:
+    if len(slopes) < 2:
         return
-    base = max(found, key=lambda one: (one[0].startswith("steady"), len(one[1])))
-    for one in found:
+    base = max(slopes, key=lambda one: (one[0].startswith("steady"), len(one[1])))
+    for one in slopes:
         words, group, slope, error = one
         if one is base:
             continue

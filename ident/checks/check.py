@@ -138,7 +138,7 @@ def read_labels(folder: Path) -> pd.DataFrame | None:
     -------
     Columns sheet, column, description, file, row; None when no file has such lines.
     """
-    found = []
+    labels = []
     pattern = re.compile(r"^(?:\[(?P<sheet>[^\]]*)\])?\s*\d+\s*\|(?P<name>[^|]*)\|[^|]*\|(?P<text>[^|]*)$")
     # Opening a pipe would wait for who writes to it.
     for path in sorted(p for p in folder.glob("*.txt") if p.is_file() and os.access(p, os.R_OK)):
@@ -148,11 +148,11 @@ def read_labels(folder: Path) -> pd.DataFrame | None:
                 hit = pattern.match(line.rstrip("\n")) if "|" in line else None
                 if hit:
                     sheet, name, text = (str(hit[k] or "").strip() for k in ("sheet", "name", "text"))
-                    found.append((sheet, name, text, path.name, row))
-    return pd.DataFrame(found, columns=["sheet", "column", "description", "file", "row"]) if found else None
+                    labels.append((sheet, name, text, path.name, row))
+    return pd.DataFrame(labels, columns=["sheet", "column", "description", "file", "row"]) if labels else None
 
 
-def run(evidence: Evidence, tell: Tell = silent) -> list[Finding]:
+def findings_of(evidence: Evidence, tell: Tell = silent) -> list[Finding]:
     """Every finding of every check, errors first.
 
     Parameters
@@ -162,12 +162,12 @@ def run(evidence: Evidence, tell: Tell = silent) -> list[Finding]:
     """
     # Numbers no boat has must not stop the check that says so.
     with np.errstate(all="ignore"):
-        checks = [(name, check) for name, own in registered().items() for check in own]
-        found: list[Finding] = []
+        checks = [(name, check) for name, of_name in registered().items() for check in of_name]
+        findings: list[Finding] = []
         for done, (name, check) in enumerate(checks, start=1):
-            found += check(evidence, rules()[name])
+            findings += check(evidence, rules()[name])
             tell("checking", done, len(checks))
-    return sorted(found, key=lambda f: -SEVERITIES.index(f.severity))
+    return sorted(findings, key=lambda f: -SEVERITIES.index(f.severity))
 
 
 def check_campaign(
@@ -194,7 +194,7 @@ def check_campaign(
         evidence = replace(evidence, fitted=checks_fitted.residuals(known))
         if not campaign.vehicle.terms_of.tabulated:
             evidence = replace(evidence, derivatives=constants(known))
-    return run(evidence, tell)
+    return findings_of(evidence, tell)
 
 
 # What is asked of several campaigns as a whole; the rest is each one's own.
@@ -203,28 +203,28 @@ _TOGETHER = ("missing", "between_tests", "duplicates", "repeated_blocks", "facil
 
 def _of_several(campaign: Campaign, folder: Path | None, identified: Identification, tell: Tell) -> list[Finding]:
     """Each campaign by itself, and what only all of them show."""
-    found: list[Finding] = []
+    findings: list[Finding] = []
     for name, one in campaign.members.items():
-        own = folder / name if folder is not None and (folder / name).is_dir() else None
-        for finding in check_campaign(one, own, tell=tell):
+        subfolder = folder / name if folder is not None and (folder / name).is_dir() else None
+        for finding in check_campaign(one, subfolder, tell=tell):
             if finding.check not in ("missing", "residuals"):
-                found.append(replace(finding, file=f"{name}/{finding.file}"))
+                findings.append(replace(finding, file=f"{name}/{finding.file}"))
     evidence = replace(evidence_of(campaign), histories=(), between=identified.between)
     evidence = replace(evidence, fitted=checks_fitted.residuals(identified))
-    known = {(f.check, f.file, f.what) for f in found}
+    known = {(f.check, f.file, f.what) for f in findings}
     with np.errstate(all="ignore"):
         for name in _TOGETHER:
             for check in registered()[name]:
-                found += [f for f in check(evidence, rules()[name]) if (f.check, f.file, f.what) not in known]
-    return sorted(found, key=lambda f: -SEVERITIES.index(f.severity))
+                findings += [f for f in check(evidence, rules()[name]) if (f.check, f.file, f.what) not in known]
+    return sorted(findings, key=lambda f: -SEVERITIES.index(f.severity))
 
 
-def constants(found: Identification) -> pd.DataFrame:
+def constants(identified: Identification) -> pd.DataFrame:
     """The coefficients without an axis, as a table of derivatives: coefficient, value, stderr, file, row."""
-    errors = np.sqrt(np.diag(found.covariance))
-    every = zip(found.nodes, found.values, errors, strict=True)
-    own = [(n.name, v, e) for n, v, e in every if not n.point and n.part == "hull"]
-    table = pd.DataFrame(own, columns=["coefficient", "value", "stderr"])
+    errors = np.sqrt(np.diag(identified.covariance))
+    every = zip(identified.nodes, identified.values, errors, strict=True)
+    of_hull = [(n.name, v, e) for n, v, e in every if not n.point and n.part == "hull"]
+    table = pd.DataFrame(of_hull, columns=["coefficient", "value", "stderr"])
     return table.assign(file="identified coefficients", row=table.index + 1)
 
 

@@ -72,13 +72,13 @@ class Finding:
 
 def spans(rows: Iterable[int]) -> str:
     """Row numbers as ``2-5, 9``."""
-    found: list[list[int]] = []
+    ranges: list[list[int]] = []
     for row in sorted(set(rows)):
-        if found and row == found[-1][1] + 1:
-            found[-1][1] = row
+        if ranges and row == ranges[-1][1] + 1:
+            ranges[-1][1] = row
         else:
-            found.append([row, row])
-    return ", ".join(f"{a}-{b}" if b > a else str(a) for a, b in found)
+            ranges.append([row, row])
+    return ", ".join(f"{a}-{b}" if b > a else str(a) for a, b in ranges)
 
 
 @dataclass(frozen=True)
@@ -220,8 +220,8 @@ def rows_of(group: pd.DataFrame) -> list[int]:
 def dynamic(runs: pd.DataFrame, body: Body) -> pd.Series:
     """1/2 rho (U^2 + (Omega L)^2) L^2 [N] of every run; NaN for a body at rest."""
     rate2 = sum(runs[c].fillna(0.0) ** 2 for c in ("p", "q", "r"))
-    found = 0.5 * body.density * body.length**2 * (runs["U"].fillna(0.0) ** 2 + rate2 * body.length**2)
-    return found.where(found > 0.0)
+    pressure = 0.5 * body.density * body.length**2 * (runs["U"].fillna(0.0) ** 2 + rate2 * body.length**2)
+    return pressure.where(pressure > 0.0)
 
 
 def prime(runs: pd.DataFrame, output: str, body: Body) -> pd.Series:

@@ -153,7 +153,7 @@ def _unread(campaign: Campaign, folder: Path) -> list[str]:
     known = {*campaign.digests, *campaign.header.tables.given().values()}
     vehicle = campaign.vehicle
     beside = {Path(p).resolve() for p in (vehicle.terms, vehicle.errata, vehicle.geometry) if p}
-    found = []
+    unread = []
     for root, folders, names in islice(os.walk(folder), _MOST):
         if Path(root) != folder and "campaign.toml" in names:
             folders.clear()
@@ -164,5 +164,5 @@ def _unread(campaign: Campaign, folder: Path) -> list[str]:
             if name.startswith(".") or path.suffix.lower() not in _TABLES or path.resolve() in beside:
                 continue
             if path.relative_to(folder).as_posix() not in known:
-                found.append(path.relative_to(folder).as_posix())
-    return found
+                unread.append(path.relative_to(folder).as_posix())
+    return unread

@@ -35,12 +35,12 @@ def doctor(folders: tuple[Path, ...], db: str | None, repair: bool, wait: float,
         raise InputError("ident doctor", "--repair or a campaign without --db", "--db with the database to repair")
     quiet = json_path == "-"
     console = console_for(quiet=quiet)
-    found: dict[str, Any] = installation()
+    report: dict[str, Any] = installation()
     with console.status("testing the installation"):
-        found["self_test"] = self_test()
-    well = not any(one["fault"] for one in found["self_test"])
+        report["self_test"] = self_test()
+    well = not any(one["fault"] for one in report["self_test"])
     if not quiet:
-        _show_installation(found, console)
+        _show_installation(report, console)
     if db is not None:
         from ident.database.doctor import examine
         from ident.database.doctor import repair as restore
@@ -51,12 +51,12 @@ def doctor(folders: tuple[Path, ...], db: str | None, repair: bool, wait: float,
                 seen = restore(db, folders, wait, status.update, completed)
             else:
                 seen = examine(db, folders, status.update, completed)
-        found["database"] = seen.to_dict()
+        report["database"] = seen.to_dict()
         well = well and seen.whole
         if not quiet:
             _show_database(seen, console)
     if json_path:
-        emit(found, json_path)
+        emit(report, json_path)
     if not well:
         sys.exit(1)
 

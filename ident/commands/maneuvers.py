@@ -52,9 +52,9 @@ class ValidateOptions:
         """What goes with a single case only, as ``ident.validate`` takes it."""
         from ident.options import Conditions, OwnReference
 
-        own = OwnReference(self.reference, self.frame, self.trial) if self.reference is not None else None
+        reference = OwnReference(self.reference, self.frame, self.trial) if self.reference is not None else None
         conditions = Conditions(self.speed, self.depth, self.angle)
-        return {"vehicle": self.vehicle, "reference": own, "conditions": conditions}
+        return {"vehicle": self.vehicle, "reference": reference, "conditions": conditions}
 
     def check(self) -> None:
         """Refuse options that do not go together. Raises ``click.UsageError``."""

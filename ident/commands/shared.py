@@ -121,12 +121,12 @@ def inputs_kept(command: click.Command) -> click.Command:
         _log.debug("command begins", extra={"command": command.name, **given})
         began = time.monotonic()
         try:
-            found = command_itself(**values)
+            result = command_itself(**values)
         except BaseException as error:
             _log.info("command ends early", extra=_after(command, began) | {"by": type(error).__name__})
             raise
         _log.info("command ends", extra=_after(command, began))
-        return found
+        return result
 
     command.callback = kept
     return command

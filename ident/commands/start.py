@@ -75,10 +75,10 @@ def offsets(
 
     if not math.isfinite(axis):
         raise click.UsageError("--axis is a finite number")
-    found = offsets_of(surface, unit, length, x == "forward", z == "up", axis)
-    written = found.write(out)
+    hull = offsets_of(surface, unit, length, x == "forward", z == "up", axis)
+    written = hull.write(out)
     if json_path != "-":
         click.echo("\n".join(path.as_posix() for path in written))
-        click.echo(f"volume {found.volume:.5g} m3, of the surface {found.surface_volume:.5g} m3")
+        click.echo(f"volume {hull.volume:.5g} m3, of the surface {hull.surface_volume:.5g} m3")
     if json_path:
-        emit(found.to_dict() | {"files": [path.as_posix() for path in written]}, json_path)
+        emit(hull.to_dict() | {"files": [path.as_posix() for path in written]}, json_path)

@@ -51,13 +51,13 @@ def estimated(vehicle: str, hull: str) -> dict[str, tuple[float, float]]:
     ----------
     vehicle, hull : Names of bundled vehicles, or their files.
     """
-    own, bare = derivatives(load_vehicle(vehicle)), derivatives(load_vehicle(hull))
-    found = {}
+    whole, bare = derivatives(load_vehicle(vehicle)), derivatives(load_vehicle(hull))
+    gained = {}
     for name in DERIVATIVES:
-        causes = own[name].errors.keys() | bare[name].errors.keys()
-        left = [own[name].errors.get(c, 0.0) - bare[name].errors.get(c, 0.0) for c in causes]
-        found[name] = own[name].value - bare[name].value, math.hypot(*left)
-    return found
+        causes = whole[name].errors.keys() | bare[name].errors.keys()
+        left = [whole[name].errors.get(c, 0.0) - bare[name].errors.get(c, 0.0) for c in causes]
+        gained[name] = whole[name].value - bare[name].value, math.hypot(*left)
+    return gained
 
 
 def _values(rows: pd.DataFrame) -> dict[str, tuple[float, float]]:
@@ -79,11 +79,11 @@ def differences(measured: Mapping[str, pd.DataFrame], boat: str) -> list[Differe
     One entry an appendage and derivative. Errors of a configuration's measured derivatives are independent of the
     hull's.
     """
-    found = []
+    rows = []
     bare = _values(measured[HULL])
     for appendage, configuration in APPENDAGES.items():
-        own = _values(measured[configuration])
+        whole = _values(measured[configuration])
         for name, (value, sigma) in estimated(f"{boat}-{configuration}", f"{boat}-{HULL}").items():
-            error = math.hypot(own[name][1], bare[name][1])
-            found.append(Difference(appendage, name, value, sigma, own[name][0] - bare[name][0], error))
-    return found
+            error = math.hypot(whole[name][1], bare[name][1])
+            rows.append(Difference(appendage, name, value, sigma, whole[name][0] - bare[name][0], error))
+    return rows

@@ -93,17 +93,17 @@ class Expressions:
         Untranslatable
             For a construct that is not known.
         """
-        found: Callable[[Any], Value] | None = getattr(self, f"_{type(node).__name__.lower()}", None)
-        if found is None:
+        translate: Callable[[Any], Value] | None = getattr(self, f"_{type(node).__name__.lower()}", None)
+        if translate is None:
             raise self.fail(node, f"{type(node).__name__} is not translated")
-        return found(node)
+        return translate(node)
 
     def number(self, node: ast.expr) -> Value:
         """An expression that is a number."""
-        found = self.value(node)
-        if not isinstance(found.kind, Number):
+        value = self.value(node)
+        if not isinstance(value.kind, Number):
             raise self.fail(node, "a number is wanted")
-        return found
+        return value
 
     def variable(self, name: str) -> Value:
         """A variable; a tuple is one variable an item."""
@@ -272,10 +272,10 @@ class Expressions:
         if test.kind.value is not None:
             return self.value(node.body if test.kind.value else node.orelse)
         before = len(self.before)
-        found = chosen(test.text, self.value(node.body), self.value(node.orelse))
+        either = chosen(test.text, self.value(node.body), self.value(node.orelse))
         if len(self.before) != before:
             raise self.fail(node, "a call that gives a tuple, where it may not be made")
-        return found
+        return either
 
     def _call(self, node: ast.Call) -> Value:
         if node.keywords:
@@ -317,15 +317,15 @@ class Expressions:
         raise self.fail(node, "a call of what is not named")
 
     def _extreme(self, target: Any, arguments: list[Value]) -> Value:
-        found = arguments[0]
+        extreme = arguments[0]
         for other in arguments[1:]:
-            assert isinstance(found.kind, Number)
+            assert isinstance(extreme.kind, Number)
             assert isinstance(other.kind, Number)
-            kind = joined(loosened(found.kind), loosened(other.kind))
+            kind = joined(loosened(extreme.kind), loosened(other.kind))
             assert isinstance(kind, Number)
             name = self.translation.helper("least" if target is min else "largest", kind.kind)
-            found = Value(f"{name}({bare(found.text)}, {bare(other.text)})", kind)
-        return found
+            extreme = Value(f"{name}({bare(extreme.text)}, {bare(other.text)})", kind)
+        return extreme
 
     def _reshaped(self, node: ast.Call) -> Value:
         assert isinstance(node.func, ast.Attribute)
@@ -354,8 +354,8 @@ class Expressions:
         if not steps:
             return Value("", Several(()))
         if len(steps) == 1 and isinstance(steps[0], ast.Return) and steps[0].value is not None:
-            found = Expressions(self.translation, function, dict(zip(names, arguments, strict=True)))
-            value = found.value(steps[0].value)
+            inlined = Expressions(self.translation, function, dict(zip(names, arguments, strict=True)))
+            value = inlined.value(steps[0].value)
             if not isinstance(value.kind, Number) or is_static(value.kind):
                 return value
         kinds = tuple(self._handed(a.kind) for a in arguments)

@@ -151,7 +151,7 @@ def c_source(boat: Boat, case: Case, db: str) -> Source:
         "g": members.add(g, "settings_real", True),
         "q": members.add(q, "settings_whole", True),
     }
-    own = {
+    of_the_flight = {
         "f": members.add(f, "progress"),
         "j": members.add(j, "leg"),
         "s": members.add(work.real, "scratch"),
@@ -168,7 +168,9 @@ def c_source(boat: Boat, case: Case, db: str) -> Source:
         "left": Number("d"),
         "h": Number("d"),
     }
-    return _written(boat, case, db, _Parts(members, fixed | own, model, settings, state, controls, trim, around))
+    return _written(
+        boat, case, db, _Parts(members, fixed | of_the_flight, model, settings, state, controls, trim, around)
+    )
 
 
 def _around(members: Members, around: Any) -> Kind:
@@ -177,12 +179,12 @@ def _around(members: Members, around: Any) -> Kind:
         return Several(())
     near = Several((members.add(around.near.a, "near"), members.add(around.near.b, "near_places", True)), ("a", "b"))
     waves = around.sea.waves
-    own = members.add(waves.amplitude, "wave_amplitude")
+    amplitude = members.add(waves.amplitude, "wave_amplitude")
     sea = members.add(around.sea._replace(waves=waves._replace(amplitude=np.zeros(0))), "sea", True)
     assert isinstance(sea, Several)
     field_of = sea.items[0]
     assert isinstance(field_of, Several)
-    sea = Several((Several((own, *field_of.items[1:]), field_of.names), *sea.items[1:]), sea.names)
+    sea = Several((Several((amplitude, *field_of.items[1:]), field_of.names), *sea.items[1:]), sea.names)
     return Several((near, sea, members.add(around.sums, "sums")), type(around)._fields)
 
 
@@ -317,11 +319,11 @@ def _wave_fields(around: Any) -> list[tuple[str, str, int, int, int]]:
     if not around or not around.near.b[WAVES]:
         return []
     count = int(around.sea.waves.amplitude.size)
-    found = [("wave_amplitude", "start_wave_amplitude", 0, count, 1), ("near", "start_near", CREST, 1, 1)]
+    fields = [("wave_amplitude", "start_wave_amplitude", 0, count, 1), ("near", "start_near", CREST, 1, 1)]
     if around.near.b[DRIFT]:
         first, end = (int(around.near.b[k]) for k in (AT_DRIFT, AT_PARTS))
-        found.append(("near", "start_near", first, end - first, 2))
-    return found
+        fields.append(("near", "start_near", first, end - first, 2))
+    return fields
 
 
 def export_c(boat: Boat, case: Case, db: str, folder: Path) -> dict[str, Any]:

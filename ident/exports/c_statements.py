@@ -60,14 +60,14 @@ class Body(Expressions):
             head = SCALARS[results.kind]
         elif isinstance(results, Several):
             given += [_declared(Value(f"*{v.text}", v.kind)) for v in self._results(results)]
-        own = [
+        variables = [
             leaf
             for variable, kind in self.variables.items()
             if variable not in self.arguments
             for leaf in flattened(named(c_name(variable), kind))
             if not is_static(leaf.kind) and _appears(leaf.text, self.lines)
         ]
-        lines = [f"{_INDENT}{_declared(v)} = 0;" for v in own]
+        lines = [f"{_INDENT}{_declared(v)} = 0;" for v in variables]
         lines += [f"{_INDENT}{SCALARS[b.kind]} {n}[{max(b.size, 1)}];" for n, b in self.arrays.items()]
         lines += [f"{_INDENT}(void){u};" for u in unused]
         said = (ast.get_docstring(parsed(self.python)) or "").split("\n\n")[0].replace("\n", " ")
@@ -86,17 +86,17 @@ class Body(Expressions):
 
     def _block(self, nodes: list[ast.stmt]) -> None:
         for node in nodes:
-            found: Any = getattr(self, f"_do_{type(node).__name__.lower()}", None)
-            if found is None:
+            translate: Any = getattr(self, f"_do_{type(node).__name__.lower()}", None)
+            if translate is None:
                 raise self.fail(node, f"{type(node).__name__} is not translated")
-            found(node)
+            translate(node)
 
     def _do_pass(self, node: ast.Pass) -> None:
         pass
 
     def _do_expr(self, node: ast.Expr) -> None:
-        found = self.value(node.value)
-        self._say(f"{found.text};" if found.text else "")
+        value = self.value(node.value)
+        self._say(f"{value.text};" if value.text else "")
 
     def _do_break(self, node: ast.Break) -> None:
         self._say("break;")
@@ -319,10 +319,10 @@ def _stores(tree: ast.FunctionDef) -> dict[str, int]:
         for name in ast.walk(loop.target)
         if isinstance(name, ast.Name)
     }
-    found: dict[str, int] = {}
+    stores: dict[str, int] = {}
     for node in ast.walk(tree):
         if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store) and id(node) not in counters:
-            found[node.id] = found.get(node.id, 0) + 1
+            stores[node.id] = stores.get(node.id, 0) + 1
         elif isinstance(node, ast.AugAssign) and isinstance(node.target, ast.Name):
-            found[node.target.id] = found.get(node.target.id, 0) + 1
-    return found
+            stores[node.target.id] = stores.get(node.target.id, 0) + 1
+    return stores

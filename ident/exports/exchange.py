@@ -71,7 +71,9 @@ def export_exchange(db: str, version: int | None, folder: Path) -> dict[str, Any
     rows, number = read_rows(db, version)
     check_folder(folder)
     path, history = folder / f"coefficients_v{number}.json", versions(db)
-    vehicles = [_vehicle(str(name), own, history, number) for name, own in rows.groupby("vehicle", sort=False)]
+    vehicles = [
+        _vehicle(str(name), of_vehicle, history, number) for name, of_vehicle in rows.groupby("vehicle", sort=False)
+    ]
     data = {
         "format": FORMAT,
         "schema": SCHEMA,
@@ -102,18 +104,18 @@ def _program() -> str:
 def _units() -> dict[str, str]:
     """Unit of every column of axes, by how its name ends; values are in prime form."""
     endings = {"mps": "m/s", "deg": "deg", "m": "m", "radps": "rad/s", "mps2": "m/s^2", "rad2ps2": "rad^2/s^2"}
-    found = {name: endings.get(name.rsplit("_", 1)[-1], "1") for name in axis_columns()}
-    return found | dict.fromkeys(("value", "stderr", "measured_value", "measured_stderr"), "1")
+    units = {name: endings.get(name.rsplit("_", 1)[-1], "1") for name in axis_columns()}
+    return units | dict.fromkeys(("value", "stderr", "measured_value", "measured_stderr"), "1")
 
 
 def _vehicle(name: str, rows: Any, history: list[Version], number: int) -> dict[str, Any]:
-    own = last_own(history, name, number) or next(v for v in history if v.number == number)
-    kept = {k: v for k, v in own.metadata.items() if k not in _OF_THE_COMMIT}
+    commit = last_own(history, name, number) or next(v for v in history if v.number == number)
+    kept = {k: v for k, v in commit.metadata.items() if k not in _OF_THE_COMMIT}
     records = [
         {k: _plain(v) for k, v in zip(column_order(), row, strict=True) if v == v}
         for row in rows[column_order()].itertuples(index=False, name=None)
     ]
-    return {"vehicle": name, "version": own.number, "digest": digest(rows), "metadata": kept, "rows": records}
+    return {"vehicle": name, "version": commit.number, "digest": digest(rows), "metadata": kept, "rows": records}
 
 
 def _plain(value: Any) -> Any:
@@ -139,9 +141,9 @@ def import_exchange(path: Path, db: str, wait: float) -> list[dict[str, Any]]:
         For a file that cannot be read, is no exchange file, or whose rows have another digest than it says; nothing
         is committed then.
     """
-    found = [_rows_of(path, one) for one in _read(path)]
+    read = [_rows_of(path, one) for one in _read(path)]
     done = []
-    for (name, wanted, metadata), rows in found:
+    for (name, wanted, metadata), rows in read:
         number, new = commit(db, rows, metadata, wait)
         done.append({"vehicle": name, "version": number, "digest": wanted, "rows": len(rows), "new": new})
     return done

@@ -119,52 +119,52 @@ def _put(archive: zipfile.ZipFile, name: str, data: str | bytes) -> None:
 def compiled(texts: dict[str, str]) -> bytes:
     """A shared library of C files, by ``$CC`` or ``cc``. Raises ``InputError`` without a compiler, or when it fails."""
     command = os.environ.get("CC", "cc")
-    found = shutil.which(command)
-    if found is None:
+    compiler = shutil.which(command)
+    if compiler is None:
         raise InputError("the C compiler", f"{command} is not there", "a C compiler, named by the variable CC")
     with tempfile.TemporaryDirectory() as folder:
         for name, text in texts.items():
             (Path(folder) / name).write_text(text, encoding="utf-8")
         names = [name for name in texts if name.endswith(".c")]
         done = subprocess.run(
-            [found, "-std=c99", "-O2", "-fPIC", "-shared", "-o", "boat.so", *names, "-lm"],
+            [compiler, "-std=c99", "-O2", "-fPIC", "-shared", "-o", "boat.so", *names, "-lm"],
             cwd=folder,
             capture_output=True,
             text=True,
             check=False,
         )
         if done.returncode:
-            raise InputError(f"the C compiler {found}", done.stderr.strip()[-500:], "a compiler of C99")
-        _log.info("compiled", extra={"compiler": found, "files": " ".join(names)})
+            raise InputError(f"the C compiler {compiler}", done.stderr.strip()[-500:], "a compiler of C99")
+        _log.info("compiled", extra={"compiler": compiler, "files": " ".join(names)})
         return (Path(folder) / "boat.so").read_bytes()
 
 
 def _variables(source: Source) -> list[_Variable]:
     state, controls, commands = source.start
-    found = [
+    variables = [
         _Variable(name, _REFS["state"] + i, unit, "output", "continuous", "exact", float(state[i]))
         for i, (name, unit) in enumerate(zip(source.states, _STATE_UNITS, strict=True))
     ]
     for i, (name, unit) in enumerate(zip(source.commands, _COMMAND_UNITS, strict=False)):
         start = float(commands[i])
-        found.append(_Variable(name, _REFS["command"] + i, unit, "input", "discrete", "", start, _SAID[name]))
+        variables.append(_Variable(name, _REFS["command"] + i, unit, "input", "discrete", "", start, _SAID[name]))
     planes = len(source.controls) - len(source.commands) + 2
     for i, name in enumerate(source.controls):
         unit = "rad" if i < planes else _COMMAND_UNITS[2 + i - planes]
         # An input has the plain name.
         shown = name if i < planes else f"{name}_reached"
         said = "as it is, behind its actuator"
-        found.append(
+        variables.append(
             _Variable(shown, _REFS["control"] + i, unit, "output", "continuous", "exact", float(controls[i]), said)
         )
-    found.append(_Variable("U", _REFS["speed"], "m/s", "output", "continuous", "calculated", said="speed"))
-    found.append(
+    variables.append(_Variable("U", _REFS["speed"], "m/s", "output", "continuous", "calculated", said="speed"))
+    variables.append(
         _Variable("D0", _REFS["depth"], "m", "output", "continuous", "calculated", said="depth of the sail top")
     )
     if source.in_waves:
         said, limits = "size of the waves as a share of the case's", (0.0, 1.0)
-        found.append(_Variable("waves", _REFS["waves"], "", "parameter", "fixed", "exact", 1.0, said, limits))
-    return found
+        variables.append(_Variable("waves", _REFS["waves"], "", "parameter", "fixed", "exact", 1.0, said, limits))
+    return variables
 
 
 def _described(variable: _Variable, fmi: int) -> xml.Element:

@@ -13,13 +13,13 @@ from sim.files.errors import InputError
 
 def _every(folder: Traversable, place: Path) -> list[tuple[Path, Traversable]]:
     """Every file at or below a folder of the package, with where it goes."""
-    found: list[tuple[Path, Traversable]] = []
+    files: list[tuple[Path, Traversable]] = []
     for one in sorted(folder.iterdir(), key=lambda entry: entry.name):
         if one.is_dir():
-            found += _every(one, place / one.name)
+            files += _every(one, place / one.name)
         elif not one.name.startswith((".", "__")):
-            found.append((place / one.name, one))
-    return found
+            files.append((place / one.name, one))
+    return files
 
 
 def write_starter(folder: str | os.PathLike[str]) -> tuple[Path, ...]:

@@ -260,8 +260,8 @@ def _likely(time: Array, value: Array) -> tuple[float, float]:
 
     grid = np.arange(*_DECADES)
     best = grid[int(np.argmin([loss(d) for d in grid]))]
-    found = minimize_scalar(loss, bounds=(best - 1.0, best + 1.0), method="bounded", options={"xatol": 0.02})
-    weight = unit * 10.0 ** float(found.x)
+    likely = minimize_scalar(loss, bounds=(best - 1.0, best + 1.0), method="bounded", options={"xatol": 0.02})
+    weight = unit * 10.0 ** float(likely.x)
     sigma = scale * math.sqrt(rest(weight)[1] / free)
     return sigma**2 / weight, sigma
 

@@ -51,13 +51,13 @@ def _rates(one: Recording, path: Callable[[str], SmoothPath]) -> Iterator[Findin
         if t.size < _FEWEST:
             continue
         should = path(angle)(t, 1)
-        own = regressed(t, rate.at(t), should)
-        if own is not None and abs(own.correlation) >= _NOT:
+        pair = regressed(t, rate.at(t), should)
+        if pair is not None and abs(pair.correlation) >= _NOT:
             continue
         best: tuple[float, str, str, str] = (_IS, "", "", "")
-        own = regressed(t, one.channels[angle].at(t), path(name)(t, 1))
-        if own is not None and abs(own.correlation) > _IS:
-            best = (abs(own.correlation), name, angle, f"{one.headers[angle]} is the rate of {one.headers[name]}")
+        pair = regressed(t, one.channels[angle].at(t), path(name)(t, 1))
+        if pair is not None and abs(pair.correlation) > _IS:
+            best = (abs(pair.correlation), name, angle, f"{one.headers[angle]} is the rate of {one.headers[name]}")
         for other in _others(one, name, angle):
             shared = _shared(t, one.channels[other].abscissa)
             if shared.size < _FEWEST:
@@ -92,12 +92,12 @@ def _along_the_track(one: Recording, path: Callable[[str], SmoothPath]) -> Itera
         if name not in one.channels:
             continue
         size = float(np.sqrt(np.mean(like**2)))
-        own = _away(one, name, t, like)
+        off = _away(one, name, t, like)
         for other in _others(one, name, "north", "east", "psi"):
             away = _away(one, other, t, like)
             pair = regressed(t, one.channels[other].at(t), like)
             like_it = pair is not None and pair.correlation > _NOT
-            if own > _SIZE * size and away < _NEARER * own and away < _SIZE * size and (like_it or name == "u"):
+            if off > _SIZE * size and away < _NEARER * off and away < _SIZE * size and (like_it or name == "u"):
                 yield _finding(one, name, other, f"the {_WORDS[name]} of the track stands in {one.headers[other]}")
 
 

@@ -39,9 +39,9 @@ def refuse_without_essentials(vehicle: Vehicle, rows: pd.DataFrame, metadata: Ma
         for output in str(essential).split():
             wanted = [t.name for t in terms if test in t.tests and t.output == output]
             if wanted and not there & set(wanted) and f"{test}.{output}" not in declared:
-                found = f"no {output} of the hull from {test}: {', '.join(wanted)[:120]} missing, every flight is wrong"
+                wrong = f"no {output} of the hull from {test}: {', '.join(wanted)[:120]} missing, every flight is wrong"
                 text = f'runs or values that give it, or in campaign.toml: [absent] "{test}.{output}" = "why"'
-                raise InputError(f"{where}, vehicle {vehicle.name}", found, text)
+                raise InputError(f"{where}, vehicle {vehicle.name}", wrong, text)
 
 
 def _absent(conversions: Mapping[str, object]) -> set[str]:

@@ -58,15 +58,15 @@ def step_error(case: Case, coefficients: Coefficients) -> StepError:
     sim.flight.trim.NoEquilibrium
         When the case starts from self-propulsion and there is none.
     """
-    own = simulate(case, coefficients)
+    flown = simulate(case, coefficients)
     finer = case.model_copy(update={"run": case.run.model_copy(update={"step_s": case.run.step_s / FINER})})
     fine = simulate(finer, coefficients)
-    rows = min(len(own.record), len(fine.record))
+    rows = min(len(flown.record), len(fine.record))
     numbers: list[float] = []
     for channel, factor in _CHANNELS.items():
-        a, b = own[channel][:rows], fine[channel][:rows]
+        a, b = flown[channel][:rows], fine[channel][:rows]
         numbers += [factor * float(np.abs(a - b).max()), factor * float(np.ptp(b))]
-    here, there = _place(own)[:, :rows], _place(fine)[:, :rows]
+    here, there = _place(flown)[:, :rows], _place(fine)[:, :rows]
     numbers += [float(np.hypot(*(here - there)).max()), float(np.hypot(*np.ptp(there, axis=1)))]
     return StepError(case.name, case.run.step_s, *numbers)
 
@@ -99,11 +99,11 @@ def main() -> None:
 
     Example: python -m sim.bench.step_errors
     """
-    found = list(_every())
+    errors = list(_every())
     with _FILE.open("w", encoding="utf-8", newline="") as stream:
         writer = csv.writer(stream, lineterminator="\n")
         writer.writerow(StepError._fields)
-        writer.writerows((f.case, f.step_s, *(f"{v:.3g}" for v in f[2:])) for f in found)
+        writer.writerows((f.case, f.step_s, *(f"{v:.3g}" for v in f[2:])) for f in errors)
 
 
 if __name__ == "__main__":

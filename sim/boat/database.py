@@ -312,5 +312,5 @@ def own_version(path: str, vehicle: str, number: int) -> Version:
 
 def last_own(history: list[Version], vehicle: str, number: int) -> Version | None:
     """The last commit of a vehicle's rows up to version ``number``, of a history oldest first."""
-    own = [v for v in history if v.number <= number and v.digest and v.metadata.get("vehicle", vehicle) == vehicle]
-    return own[-1] if own else None
+    commits = [v for v in history if v.number <= number and v.digest and v.metadata.get("vehicle", vehicle) == vehicle]
+    return commits[-1] if commits else None

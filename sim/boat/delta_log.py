@@ -172,8 +172,8 @@ class Log:
         self.storage = Storage(path)
         local = self.storage.local
         if local is not None and not (local / LOG).is_dir():
-            found = "a file" if local.is_file() else "no coefficient database"
-            raise InputError(path, found, f"{OURS}; choose it with --db")
+            there = "a file" if local.is_file() else "no coefficient database"
+            raise InputError(path, there, f"{OURS}; choose it with --db")
         # Before the entries are listed: a commit in between makes more of them, never fewer.
         latest = latest_said(self.storage)
         every = self.storage.sizes(LOG)

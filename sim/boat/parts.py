@@ -44,11 +44,11 @@ def all_terms(vehicle: Vehicle) -> tuple[Term, ...]:
         return catalogue.terms(vehicle.term_set)
     path = Path(vehicle.terms)
     changed = path.stat().st_mtime_ns if path.is_file() else 0
-    own = catalogue.own_terms(vehicle.terms, vehicle.term_set, changed)
-    for term in own:
+    added = catalogue.own_terms(vehicle.terms, vehicle.term_set, changed)
+    for term in added:
         if term.part not in (*vehicle.part_names(), "section"):
             raise InputError(f"{path}, term {term.name}, column part", repr(term.part), ", ".join(vehicle.part_names()))
-    return (*catalogue.terms(vehicle.term_set), *own)
+    return (*catalogue.terms(vehicle.term_set), *added)
 
 
 def parts_of(term: Term, vehicle: Vehicle) -> list[str]:

@@ -57,8 +57,8 @@ def check_vehicle(vehicle: Any, where: str) -> None:
     InputError
         Naming the file, the key, what was found and what is allowed.
     """
-    for key, found, allowed in _faults(vehicle):
-        raise InputError(f"{where}, key {key}", found, allowed)
+    for key, value, allowed in _faults(vehicle):
+        raise InputError(f"{where}, key {key}", value, allowed)
 
 
 def check_mass(total: Any, added: Any, vehicle: Any) -> None:

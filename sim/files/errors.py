@@ -44,11 +44,11 @@ def _again(kind: type[InputError], args: tuple[Any, ...], state: dict[str, Any])
 
 def _known(kind: type[BaseModel], place: tuple[int | str, ...]) -> list[str]:
     """Keys of the part of a file that a pydantic location without its last entry leads to."""
-    found: type[BaseModel] | None = kind
+    model: type[BaseModel] | None = kind
     for part in place[:-1]:
-        if isinstance(part, str) and found is not None and part in found.model_fields:
-            found = _model_in(found.model_fields[part].annotation)
-    return list(found.model_fields) if found is not None else []
+        if isinstance(part, str) and model is not None and part in model.model_fields:
+            model = _model_in(model.model_fields[part].annotation)
+    return list(model.model_fields) if model is not None else []
 
 
 def _model_in(annotation: Any) -> type[BaseModel] | None:

@@ -58,9 +58,9 @@ class Frame:
 
     def __post_init__(self) -> None:
         for axis, allowed in DIRECTIONS.items():
-            found = getattr(self, axis)
-            if found not in allowed:
-                raise FrameError(f"frame axis {axis} = {found!r}; allowed: {', '.join(allowed)}")
+            direction = getattr(self, axis)
+            if direction not in allowed:
+                raise FrameError(f"frame axis {axis} = {direction!r}; allowed: {', '.join(allowed)}")
         if self.rotations not in ("", *SENSES):
             raise FrameError(f"frame rotations = {self.rotations!r}; allowed: {', '.join(SENSES)}")
         if self.signs["x"] * self.signs["y"] * self.signs["z"] < 0 and not self.rotations:

@@ -174,12 +174,12 @@ class Storage:
                 where = Path(self.path) / folder
                 if not where.is_dir():
                     return {}
-                found = {}
+                sizes = {}
                 for item in os.scandir(where):
                     with contextlib.suppress(FileNotFoundError):
                         if item.is_file():
-                            found[item.name] = item.stat().st_size
-                return found
+                            sizes[item.name] = item.stat().st_size
+                return sizes
             from pyarrow.fs import FileSelector, FileType
 
             selector = FileSelector(folder or "/", allow_not_found=True, recursive=False)

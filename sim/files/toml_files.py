@@ -38,12 +38,12 @@ def read_toml(name: str | Path, kind: str, named_in: str = "") -> tuple[dict[str
     except OSError:
         there = False
     if not there:
-        found, text = "no such file", "a path to a .toml file"
+        missing, text = "no such file", "a path to a .toml file"
         if kind:
-            found, text = "no such file or bundled name", f"one of {', '.join(bundled(kind))}, or a path"
+            missing, text = "no such file or bundled name", f"one of {', '.join(bundled(kind))}, or a path"
         if named_in:
-            raise InputError(named_in, f"{str(name)[:200]!r}: {found}", text)
-        raise InputError(str(name)[:200], found, text)
+            raise InputError(named_in, f"{str(name)[:200]!r}: {missing}", text)
+        raise InputError(str(name)[:200], missing, text)
     raw = inputs.statements(path)
     try:
         return tomllib.loads(raw.decode("utf-8")), str(path)

@@ -51,8 +51,8 @@ class Sensors:
 
     def read(self, plant: Plant) -> dict[str, float]:
         """One reading of every channel. Raises ``KeyError`` for a channel that the plant does not have."""
-        found = {}
+        readings = {}
         for name in self.channels:
             shown = plant[name] + self._bias.get(name, 0.0)
-            found[name] = shown + self._noise.get(name, 0.0) * float(self._generator.standard_normal())
-        return found
+            readings[name] = shown + self._noise.get(name, 0.0) * float(self._generator.standard_normal())
+        return readings

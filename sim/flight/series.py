@@ -38,10 +38,10 @@ class Series:
 
 def _from_start(series: Series, channels: list[str]) -> Series:
     """The series with the listed channels beginning at zero."""
-    for own in series.data.values():
+    for records in series.data.values():
         for channel in channels:
-            if channel in own:
-                own[channel] = own[channel].less(own[channel].shown.value[0])
+            if channel in records:
+                records[channel] = records[channel].less(records[channel].shown.value[0])
     return series
 
 

@@ -84,7 +84,7 @@ def derivatives(vehicle: Vehicle, with_fins: bool = True) -> dict[str, Derivativ
     tower = sail_fin(geometry, folder, hull)
     # Fins ahead of amidships, such as planes on the sail or the bow, are no stern fins.
     fins, radius = fins_of(geometry, folder, hull, origin)
-    found = {}
+    values = {}
     for plane in ("horizontal", "vertical"):
         value, sigma = hull_prior(hull)
         total, errors = np.append(value, 0.0), {"end of potential flow": np.append(sigma, 0.0)}
@@ -93,9 +93,9 @@ def derivatives(vehicle: Vehicle, with_fins: bool = True) -> dict[str, Derivativ
         for part in parts:
             total = total + part.value
             errors |= part.errors
-        for name, (own, k, sign, power) in _DERIVATIVES.items():
-            if own == plane:
+        for name, (axis, k, sign, power) in _DERIVATIVES.items():
+            if axis == plane:
                 by = {cause: float(sign * change[k] / length**power) for cause, change in errors.items()}
                 sigma_k = float(np.sqrt(sum(x**2 for x in by.values())))
-                found[name] = Derivative(float(sign * total[k] / length**power), sigma_k, by)
-    return found
+                values[name] = Derivative(float(sign * total[k] / length**power), sigma_k, by)
+    return values

@@ -86,7 +86,7 @@ def _part_cells(part: Mesh, length: float, bands: int) -> tuple[Array, Array, Ar
     count = max(1, round((high[0] - low[0]) / length))
     step, edges = (high[0] - low[0]) / count, np.linspace(low[2], high[2], bands + 1)
     nodes, weights = np.polynomial.legendre.leggauss(4)
-    found = []
+    cells = []
     for k in range(count):
         at = low[0] + step * (k + 0.5 * (1.0 + nodes))
         # (station, quantity, side, band): area and its moments in y and z.
@@ -96,8 +96,8 @@ def _part_cells(part: Mesh, length: float, bands: int) -> tuple[Array, Array, Ar
         moments = [np.tensordot(share * at, cuts[:, 0], axes=1), *np.tensordot(share, cuts[:, 1:], axes=1)]
         for s, j in np.argwhere(volume > _DUST * part.volume / (count * bands)):
             middle = (low[0] + step * (k + 0.5), 0.5 * (edges[j] + edges[j + 1]))
-            found.append([volume[s, j], *(m[s, j] / volume[s, j] for m in moments), *middle])
-    table, band = np.array(found), edges[1] - edges[0]
+            cells.append([volume[s, j], *(m[s, j] / volume[s, j] for m in moments), *middle])
+    table, band = np.array(cells), edges[1] - edges[0]
     half = np.stack(np.broadcast_arrays(0.5 * step, 0.5 * table[:, 0] / (step * band), 0.5 * band), axis=1)
     return table[:, 1:4], table[:, [4, 2, 5]], half, table[:, 0] * part.volume / table[:, 0].sum()
 

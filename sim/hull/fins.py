@@ -135,18 +135,18 @@ def loads(fins: list[Fin], radius: float, plane: str, origin: float, with_hull: 
     middle = 0.5 * (grid.a + grid.b)
     lever = origin - middle[:, 0]
     height = middle @ (np.array([0.0, 0.0, 1.0]) if plane == "horizontal" else np.array([0.0, -1.0, 0.0]))
-    found = []
+    totals = []
     for speed in (np.ones(len(wash)), origin - grid.control[:, 0]):
         circulation = np.linalg.solve(matrix, -wash * speed)
-        own = normal_load(circulation, grid.a, grid.b, across)
-        both = own + (normal_load(circulation, image_a, image_b, across) if with_hull else 0.0)
-        found += [both.sum(), both @ lever]
-        roll = own @ height
-        if len(found) == 2:
+        of_the_fin = normal_load(circulation, grid.a, grid.b, across)
+        both = of_the_fin + (normal_load(circulation, image_a, image_b, across) if with_hull else 0.0)
+        totals += [both.sum(), both @ lever]
+        roll = of_the_fin @ height
+        if len(totals) == 2:
             first_roll = roll
     # A load against the cross-flow.
-    sign = -np.sign(found[0]) if found[0] else 1.0
-    return 2.0 * sign * np.array([found[0], found[1], found[2], found[3], first_roll])
+    sign = -np.sign(totals[0]) if totals[0] else 1.0
+    return 2.0 * sign * np.array([totals[0], totals[1], totals[2], totals[3], first_roll])
 
 
 def stern_fins(fins: list[Fin], radius: float, plane: str, origin: float) -> Part:

@@ -83,10 +83,10 @@ def lattice(fins: list[Fin], counts: tuple[int, int, int] = FINE) -> Lattice:
     """
     rows, moving, owner = [], [], []
     for i, fin in enumerate(fins):
-        own, own_moving = _fin_panels(fin, counts)
-        rows += own
+        panels, own_moving = _fin_panels(fin, counts)
+        rows += panels
         moving += own_moving
-        owner += [i] * len(own)
+        owner += [i] * len(panels)
     corners = np.stack(rows)
     return Lattice(
         corners[:, 0], corners[:, 1], corners[:, 2], corners[:, 3], np.array(owner), np.array(moving, dtype=bool)

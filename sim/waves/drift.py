@@ -82,8 +82,10 @@ def make_drift(
 
 def _frequencies(waves: Waves) -> Array:
     """Where the quadratic transfer functions are worked out: at each component or on a grid."""
-    own = np.unique(waves.frequency)
-    return own if own.size <= _FREQUENCIES else np.geomspace(own[0], own[-1], _FREQUENCIES)
+    frequencies = np.unique(waves.frequency)
+    return (
+        frequencies if frequencies.size <= _FREQUENCIES else np.geomspace(frequencies[0], frequencies[-1], _FREQUENCIES)
+    )
 
 
 def _at_components(frequencies: Array, values: Array, waves: Waves) -> Array:

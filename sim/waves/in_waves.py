@@ -106,8 +106,8 @@ def shares(added: Array, centres: Array, masses: Array) -> Array:
     parts = np.zeros((len(centres) + 1, 6, 6))
     for k, (r, m) in enumerate(zip(centres, masses, strict=True)):
         parts[k] = section_added_mass(r, m) / unit
-    own = added / unit
-    turn = _root(0.5 * (own + own.T), 0.5) @ _root(parts.sum(axis=0), -0.5)
+    inertia = added / unit
+    turn = _root(0.5 * (inertia + inertia.T), 0.5) @ _root(parts.sum(axis=0), -0.5)
     parts[:-1] = turn @ parts[:-1] @ turn.T
     parts *= unit
     parts[-1] = added - parts[:-1].sum(axis=0)
