@@ -181,7 +181,7 @@ def fit(
     """Identify the coefficients of every campaign at or below a folder; commit one version each.
 
     Runs are turned to the program frame (x forward, y starboard, z down), made dimensionless and decoupled in order,
-    with the errors of what was subtracted [1]_ [2]_ [3]_. What they do not say, named estimates do
+    with the errors of what was subtracted. What they do not say, named estimates do
     (``ident.estimates``): a row names its own. Either every campaign can be fitted, or nothing is committed.
 
     Parameters
@@ -206,10 +206,12 @@ def fit(
 
     References
     ----------
-    .. [1] Gertler, M., Hagen, G. R., "Standard equations of motion for submarine simulation", NSRDC Report 2510, 1967.
-    .. [2] Feldman, J., "DTNSRDC revised standard submarine equations of motion", DTNSRDC/SPD-0393-09, 1979.
-    .. [3] Kim, Y., "Development and Validation of Hydrodynamic Model for Near Free Surface Maneuvers of BB2 Joubert
-       Generic Submarine", PhD thesis, University of Iowa, 2021, doi 10.17077/etd.005772, Eqs. (17)-(31).
+    Gertler, M., Hagen, G. R., "Standard equations of motion for submarine simulation", NSRDC Report 2510, 1967.
+
+    Feldman, J., "DTNSRDC revised standard submarine equations of motion", DTNSRDC/SPD-0393-09, 1979.
+
+    Kim, Y., "Development and Validation of Hydrodynamic Model for Near Free Surface Maneuvers of BB2 Joubert
+    Generic Submarine", PhD thesis, University of Iowa, 2021, doi 10.17077/etd.005772, Eqs. (17)-(31).
 
     Examples
     --------
