@@ -28,7 +28,6 @@ from ident.checks.findings import rules
 from ident.commands import times
 from ident.validation.board import Scoreboard
 from ident.validation.figures import case_figure
-from ident.validation.scoreboard import run_all
 from sim.bench.guard import recorded
 from sim.bench.step_errors import recorded as step_errors
 from sim.boat import catalogue
@@ -223,7 +222,7 @@ def main() -> int:
             # A calibration takes minutes, so only a full run renews what follows from it.
             prediction["choices"] = choices.choices(db, fitted.campaign)
             ident.calibrate("bb2", db)
-            board = run_all(db, None, None)
+            board = ident.scoreboard(db)
             main_case = next(one for one in board.flown if one.case.name == CASE)
             case_figure(main_case, ROOT / "docs" / f"{CASE}.png")
             readme["accuracy"] = accuracy(board)

@@ -17,7 +17,8 @@ from ident.arrival import register_with_gymnasium
 if TYPE_CHECKING:
     from ident.analysis.result import Linear, Stability, StabilityMap
     from ident.analysis.stability import stability
-    from ident.calibration.result import Calibrated
+    from ident.analysis.state_space import StateSpaceModel
+    from ident.calibration.result import Calibrated, CalibrationSummary, LeftOut, MultiplierGroup, Prior, TrainedSeries
     from ident.calibration.version import calibrate
     from ident.captive.campaign import Campaign, read_campaign
     from ident.cfd.batch import Batch, plan_cases
@@ -25,21 +26,34 @@ if TYPE_CHECKING:
     from ident.checks.findings import Finding
     from ident.database.compare import Change, Difference
     from ident.database.versions import Database, DatabaseVersion
+    from ident.estimates.predict import Estimated
     from ident.fitting.fit import Fit, fit
+    from ident.identification.identify import Identification
+    from ident.metrics.in_waves import InWaves
+    from ident.metrics.metric import Interval, Metric
+    from ident.metrics.turning import SpiralPoint
     from ident.options import Conditions, Diagnostics, OwnReference, Work
     from ident.output import Results
     from ident.planning.matrix import Need, Plan
     from ident.planning.plan import plan
     from ident.schemas.describe import schema
     from ident.starter.write import write_starter
+    from ident.validation.band_summary import BandSummary, VarianceShare
+    from ident.validation.bands import Bands
+    from ident.validation.board import BoardCase, ComparedError, Scoreboard
+    from ident.validation.coverage import OutsideUse
+    from ident.validation.other_boat import Saturated
     from ident.validation.result import ChannelError, Validation
+    from ident.validation.scoreboard import scoreboard
+    from ident.validation.sweep import SweepPoint
     from ident.validation.validate import validate
     from sim.files.errors import InputError
     from sim.flight.guidance import LineOfSight
     from sim.flight.plant import Plant
     from sim.flight.sensors import Sensors
+    from sim.flight.series import Series
     from sim.flight.simulate import Simulation
-    from sim.flight.trim import NoEquilibrium
+    from sim.flight.trim import NoEquilibrium, Trim
 
 __version__ = "0.1.0"
 
@@ -52,6 +66,7 @@ _PLACES = {
     "fit": "ident.fitting.fit",
     "calibrate": "ident.calibration.version",
     "validate": "ident.validation.validate",
+    "scoreboard": "ident.validation.scoreboard",
     "stability": "ident.analysis.stability",
     "write_starter": "ident.starter.write",
     "schema": "ident.schemas.describe",
@@ -76,6 +91,29 @@ _PLACES = {
     "StabilityMap": "ident.analysis.result",
     "Stability": "ident.analysis.result",
     "Linear": "ident.analysis.result",
+    "Scoreboard": "ident.validation.board",
+    "BoardCase": "ident.validation.board",
+    "ComparedError": "ident.validation.board",
+    "Metric": "ident.metrics.metric",
+    "Interval": "ident.metrics.metric",
+    "InWaves": "ident.metrics.in_waves",
+    "SpiralPoint": "ident.metrics.turning",
+    "SweepPoint": "ident.validation.sweep",
+    "Bands": "ident.validation.bands",
+    "BandSummary": "ident.validation.band_summary",
+    "VarianceShare": "ident.validation.band_summary",
+    "OutsideUse": "ident.validation.coverage",
+    "Saturated": "ident.validation.other_boat",
+    "Identification": "ident.identification.identify",
+    "Estimated": "ident.estimates.predict",
+    "CalibrationSummary": "ident.calibration.result",
+    "MultiplierGroup": "ident.calibration.result",
+    "Prior": "ident.calibration.result",
+    "LeftOut": "ident.calibration.result",
+    "TrainedSeries": "ident.calibration.result",
+    "Series": "sim.flight.series",
+    "Trim": "sim.flight.trim",
+    "StateSpaceModel": "ident.analysis.state_space",
     "Results": "ident.output",
     "Work": "ident.options",
     "Diagnostics": "ident.options",
@@ -93,6 +131,7 @@ __all__ = [  # noqa: RUF022  (in the order of the work)
     "fit",
     "calibrate",
     "validate",
+    "scoreboard",
     "stability",
     "write_starter",
     "schema",
@@ -117,6 +156,29 @@ __all__ = [  # noqa: RUF022  (in the order of the work)
     "StabilityMap",
     "Stability",
     "Linear",
+    "Scoreboard",
+    "BoardCase",
+    "ComparedError",
+    "Metric",
+    "Interval",
+    "InWaves",
+    "SpiralPoint",
+    "SweepPoint",
+    "Bands",
+    "BandSummary",
+    "VarianceShare",
+    "OutsideUse",
+    "Saturated",
+    "Identification",
+    "Estimated",
+    "CalibrationSummary",
+    "MultiplierGroup",
+    "Prior",
+    "LeftOut",
+    "TrainedSeries",
+    "Series",
+    "Trim",
+    "StateSpaceModel",
     "Results",
     "Work",
     "Diagnostics",

@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+import ident
 from ident.metrics.zigzag import roll_decay, zigzag
 from sim.flight.case import load_case
 from sim.flight.series import load_reference
@@ -92,9 +93,7 @@ def test_roll_decay_of_a_damped_cosine():
 
 def test_every_bundled_case_flies_and_is_compared(fitted_db):
     """The scoreboard: a finite error for every channel, ratios over the published model."""
-    from ident.validation.scoreboard import run_all
-
-    flown = run_all(fitted_db, None, None)
+    flown = ident.scoreboard(fitted_db)
     board = flown.to_dict()
     assert [c["case"] for c in board["cases"]] == [one.case.name for one in flown.flown]
     assert {"hzz20", "vzz10-06kt", "vzz10-10kt", "roll-decay"} <= {c["case"] for c in board["cases"]}

@@ -14,7 +14,7 @@ from ident.captive.campaign import read_campaign
 from ident.database.store import commit, database_rows
 from ident.identification.identify import identify
 from ident.validation.board import geometric_mean
-from ident.validation.scoreboard import is_trained, run_all
+from ident.validation.scoreboard import is_trained, scoreboard
 from ident.validation.scoreboard_tables import show
 from ident.validation.validate import validate
 
@@ -41,7 +41,7 @@ def _suboff():
 def board(database):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("ident.validation.scoreboard.case_names", lambda folder: CASES)
-        return run_all(database, None, None, workers=2)
+        return scoreboard(database, workers=2)
 
 
 @pytest.fixture(scope="module")
@@ -94,7 +94,7 @@ def test_parent_is_the_vehicles_own_earlier_version(printed):
 def test_first_version_has_no_parent(database):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("ident.validation.scoreboard.case_names", lambda folder: CASES[:1])
-        first = run_all(database, 0, None).to_dict()
+        first = scoreboard(database, 0).to_dict()
     entry = first["cases"][0]["references"]["EXP"]["phi"]
     assert (first["cases"][0]["parent"], entry["parent_rmse"], entry["ratio_to_parent"]) == (None, None, None)
     assert first["geometric_mean_ratio_to_parent"] == {"trained": None, "untrained": None}
@@ -103,7 +103,7 @@ def test_first_version_has_no_parent(database):
 def test_board_does_not_depend_on_workers(database, printed):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("ident.validation.scoreboard.case_names", lambda folder: CASES)
-        alone = run_all(database, None, None, workers=1).to_dict()
+        alone = scoreboard(database, workers=1).to_dict()
     assert json.dumps(alone) == json.dumps(printed)
 
 

@@ -46,6 +46,14 @@ class StateSpaceModel:
     a, b, c, d : Matrices.
     about : Values of the states that x are the changes from.
     lag : Time constant of the actuators [s].
+
+    Examples
+    --------
+    >>> import ident
+    >>> (state,) = ident.stability("my-boat/zigzag.toml", db="coeff_db", speeds=[4.0])
+    >>> model = state.state_space()
+    >>> model.a.shape == (len(model.states), len(model.states))
+    True
     """
 
     states: tuple[str, ...]

@@ -30,6 +30,12 @@ class Prior:
     method : Where it is from: captive, stated, or a named estimate.
     estimate : Whether that is an estimate.
     source : Its source in words.
+
+    Examples
+    --------
+    >>> import ident
+    >>> ident.Prior(1.0, 0.2, "stated", estimate=False, source="trials of a sister").sigma
+    0.2
     """
 
     mean: float
@@ -48,7 +54,7 @@ class Known:
 
 
 @dataclass(frozen=True)
-class Group:
+class MultiplierGroup:
     """A group of coefficients and its multiplier.
 
     Attributes
@@ -65,6 +71,15 @@ class Group:
     beyond_captive : Whether the captive error alone does not allow the posterior.
     chosen : False for a group that the calibration held at its prior mean.
     evidence : Change of the log evidence by its freedom, the others as chosen; positive where the maneuvers ask for it.
+
+    Examples
+    --------
+    >>> import ident
+    >>> _ = ident.fit("my-boat/captive", db="summary_db")
+    >>> done = ident.calibrate("my-boat/calibration.toml", db="summary_db", left_out=False)
+    >>> group = done.summary.groups[0]
+    >>> group.name, group.posterior.sigma < group.prior.sigma
+    ('rudders', True)
     """
 
     name: str
@@ -95,7 +110,7 @@ class Group:
         return "; ".join(words) or "within the captive error"
 
     @classmethod
-    def of(cls, stored: dict[str, Any]) -> Group:
+    def of(cls, stored: dict[str, Any]) -> MultiplierGroup:
         """A group as a version's metadata holds it."""
         alone = stored["maneuvers_alone"]
         parts = {"prior": Prior(**stored["prior"]), "posterior": Known(**stored["posterior"])}
@@ -111,6 +126,12 @@ class TrainedSeries:
     case, source, channel : Of the reference.
     rmse : What the posterior leaves, in the unit of the reference.
     sigma : Standard deviation that the channel was weighted with.
+
+    Examples
+    --------
+    >>> import ident
+    >>> ident.TrainedSeries("zigzag", "TRIAL", "psi", rmse=0.8, sigma=1.0).rmse
+    0.8
     """
 
     case: str
@@ -130,6 +151,12 @@ class LeftOut:
     value, sigma : (groups,) posterior without it.
     shift_in_sigma : (groups,) how far that is from the whole posterior.
     rmse_predicted, rmse_trained : Channel -> error of what was left out, predicted and when trained on.
+
+    Examples
+    --------
+    >>> import ident
+    >>> ident.LeftOut("zigzag", "TRIAL", [1.1], [0.1], [0.5], {"psi": 2.0}, {"psi": 1.0}).shift_in_sigma
+    [0.5]
     """
 
     case: str
@@ -142,7 +169,7 @@ class LeftOut:
 
 
 @dataclass(frozen=True)
-class Summary:
+class CalibrationSummary:
     """A calibration in numbers, as the metadata of its version hold it.
 
     Attributes
@@ -159,6 +186,14 @@ class Summary:
     evidence : log evidence of the chosen groups and of all of them, less that of none.
     sampled : The posterior by draws, where that was asked for.
     sensitivity : What decides each channel over the priors, where that was asked for.
+
+    Examples
+    --------
+    >>> import ident
+    >>> _ = ident.fit("my-boat/captive", db="summary_db")
+    >>> done = ident.calibrate("my-boat/calibration.toml", db="summary_db", left_out=False)
+    >>> done.summary.parent, done.summary.trained
+    (0, ['my-zigzag:TRIAL'])
     """
 
     calibration: str
@@ -168,7 +203,7 @@ class Summary:
     source: str
     file_digest: str
     trained: list[str]
-    groups: list[Group]
+    groups: list[MultiplierGroup]
     covariance: list[list[float]]
     series: list[TrainedSeries]
     left_out: list[LeftOut]
@@ -203,7 +238,7 @@ class Calibrated:
     'within the captive error'
     """
 
-    summary: Summary
+    summary: CalibrationSummary
     version: int
     new: bool
     digest: str
@@ -241,7 +276,7 @@ class Calibrated:
         return html_table(title, ("group", *table.columns), rows)
 
 
-def _show_draws(summary: Summary, console: Console) -> None:
+def _show_draws(summary: CalibrationSummary, console: Console) -> None:
     """Print the sampled posterior and what decides each channel."""
     from rich.table import Table
 

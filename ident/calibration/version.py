@@ -17,7 +17,15 @@ from ident.calibration.estimate import calibrate as most_probable
 from ident.calibration.file import Parameter, apply, load_calibration, parameters
 from ident.calibration.posterior import Sampled, emcee, sample
 from ident.calibration.problem import Channel, Problem, contradictions, problem
-from ident.calibration.result import Calibrated, Group, Known, LeftOut, Prior, Summary, TrainedSeries
+from ident.calibration.result import (
+    Calibrated,
+    CalibrationSummary,
+    Known,
+    LeftOut,
+    MultiplierGroup,
+    Prior,
+    TrainedSeries,
+)
 from ident.calibration.selection import Comparison, compare
 from ident.calibration.sensitivity import sensitivity as what_decides
 from ident.database.store import commit, digest
@@ -78,7 +86,7 @@ def from_data(parameter: Parameter, value: float, sigma: float) -> tuple[float, 
     return float(alone), float(gained**-0.5)
 
 
-def _group(parameter: Parameter, value: float, sigma: float, chosen: bool, evidence: float) -> Group:
+def _group(parameter: Parameter, value: float, sigma: float, chosen: bool, evidence: float) -> MultiplierGroup:
     prior = parameter.group.prior
     alone = from_data(parameter, value, sigma)
     away = None
@@ -86,7 +94,7 @@ def _group(parameter: Parameter, value: float, sigma: float, chosen: bool, evide
         away = abs(alone[0] - parameter.mean) / float(np.hypot(alone[1], parameter.sigma))
     method = parameter.method
     known = Prior(parameter.mean, parameter.sigma, method, prior.method not in ("captive", "stated"), prior.source)
-    return Group(
+    return MultiplierGroup(
         name=parameter.group.name,
         title=parameter.group.title,
         kind=parameter.group.kind,
@@ -230,7 +238,7 @@ def _solved(every: Problem, choose: str, workers: int | None, each: Callable[[st
     return Solved(task, _rounded(most_probable(task, workers, each, start)), comparison, comparison.kept)
 
 
-def _groups(every: Problem, solved: Solved) -> list[Group]:
+def _groups(every: Problem, solved: Solved) -> list[MultiplierGroup]:
     """Every group as it stands: free ones at their posterior, held ones at their prior."""
     groups, gain = [], solved.comparison.gain
     free = dict(zip(solved.kept, zip(solved.estimate.theta, solved.estimate.deviation, strict=True), strict=True))
@@ -314,7 +322,7 @@ def calibrate(
         rows = measured_rows(rows)
     every = problem(spec, where, vehicle, rows, parameters(spec, vehicle, rows, where))
     solved, learnt = _learnt(every, spec.choose, left_out, diagnostics, work)
-    summary = Summary(
+    summary = CalibrationSummary(
         calibration=spec.name,
         vehicle=vehicle.name,
         parent=base.number,
@@ -382,7 +390,7 @@ def _warnings(task: Problem, estimate: Estimate, without: list[LeftOut], drawn: 
     return said
 
 
-def _metadata(base: Version, task: Problem, summary: Summary, message: str) -> dict[str, str]:
+def _metadata(base: Version, task: Problem, summary: CalibrationSummary, message: str) -> dict[str, str]:
     """What the commit carries beside its rows: of the fit it starts from, and of the calibration."""
     named = ("campaign", "facility", "provenance", "frame", "inputs", *_FIT)
     return {k: v for k, v in base.metadata.items() if k in named} | {

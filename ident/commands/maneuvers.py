@@ -260,16 +260,16 @@ def _board_with_bands(board: Scoreboard, done: list[Validation], asked: Validate
 
 
 def _all(asked: ValidateOptions, console: Any) -> Scoreboard:
-    from ident.validation.scoreboard import run_all
+    from ident.validation.scoreboard import scoreboard
     from ident.validation.scoreboard_tables import show
 
     with console.status("flying") as status:
-        board = run_all(
+        board = scoreboard(
             asked.db,
             asked.version,
-            asked.cases,
-            lambda name: status.update(f"flying {on_screen(name)}"),
-            left_out=asked.left_out,
+            cases=asked.cases,
+            without=asked.left_out,
+            tell=lambda name, place, of: status.update(f"flying {on_screen(name)}, {place + 1} of {of}"),
         )
     show(board, console)
     return board

@@ -80,6 +80,13 @@ class Estimated:
     name, title, source : Of the method.
     applied : False when it had nothing to work from, or was left out.
     said : What it did, or why not.
+
+    Examples
+    --------
+    >>> import ident
+    >>> (done,) = ident.fit("my-boat/captive", db="coeff_db")
+    >>> {one.name for one in done.estimates if one.applied} <= {one.name for one in done.estimates}
+    True
     """
 
     name: str

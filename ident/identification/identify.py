@@ -50,6 +50,14 @@ class Identification:
     unused : (run_id, file, row, output, reason) for every load that was not used.
     warnings : (run_id or coefficient, message).
     between : Error between facilities of each load, where several campaigns give it.
+
+    Examples
+    --------
+    >>> import ident
+    >>> (done,) = ident.fit("my-boat/captive", db="coeff_db")
+    >>> found = done.identification
+    >>> found.covariance.shape == (len(found.nodes), len(found.values))
+    True
     """
 
     campaign: Campaign

@@ -34,6 +34,13 @@ class InWaves:
     ----------
     harmonics : Channel -> harmonics, in a regular wave.
     statistics : Channel -> statistics, in an irregular sea.
+
+    Examples
+    --------
+    >>> import ident
+    >>> done = ident.validate("my-boat/zigzag.toml", db="coeff_db", version=0)
+    >>> done.in_waves.harmonics, done.in_waves.statistics
+    ({}, {})
     """
 
     harmonics: Mapping[str, Harmonics] = field(default_factory=dict)

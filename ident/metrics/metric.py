@@ -17,6 +17,12 @@ class Interval:
     ----------
     q025, q50, q975 : Quantiles over the samples that come to it; None where none does.
     without : Share of the samples that do not, 0 to 1.
+
+    Examples
+    --------
+    >>> import ident
+    >>> ident.Interval(7.1, 7.9, 8.8, 0.0).q50
+    7.9
     """
 
     q025: float | None = None
@@ -41,7 +47,8 @@ class Metric(Mapping[str, float | None]):
 
     Examples
     --------
-    >>> metric = Metric({"simulated": 7.9, "EXP": 8.2})
+    >>> import ident
+    >>> metric = ident.Metric({"simulated": 7.9, "EXP": 8.2})
     >>> metric.simulated, metric["EXP"]
     (7.9, 8.2)
     """

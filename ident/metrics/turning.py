@@ -157,6 +157,12 @@ class SpiralPoint:
     ----------
     dH_deg : Rudder or horizontal command [deg].
     r_degps : Yaw rate [deg/s].
+
+    Examples
+    --------
+    >>> import ident
+    >>> ident.SpiralPoint(dH_deg=5.0, r_degps=0.4).r_degps
+    0.4
     """
 
     dH_deg: float

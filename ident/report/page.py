@@ -187,13 +187,13 @@ def _vocabulary(metadata: dict[str, str], rows: pd.DataFrame) -> list[dict[str, 
 def _calibration(commit: Version, vehicle: Vehicle, number: int) -> dict[str, Any] | None:
     """What the version was calibrated with, with verdicts and a figure; None for captive versions."""
     from ident.calibration.figure import prior_and_posterior
-    from ident.calibration.result import Group
+    from ident.calibration.result import MultiplierGroup
 
     stored = _stored(commit.metadata, "calibration", {})
     if not stored:
         return None
     stamp = f"{vehicle.name}, database version {number}; program frame: {PROGRAM}"
-    groups = [g | {"verdict": Group.of(g).verdict} for g in stored["groups"]]
+    groups = [g | {"verdict": MultiplierGroup.of(g).verdict} for g in stored["groups"]]
     return stored | {"groups": groups, "figure": prior_and_posterior(stored, stamp)}
 
 

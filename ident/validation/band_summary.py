@@ -37,6 +37,12 @@ class VarianceShare:
     coefficient : Its symbol.
     share : Of the variance, 0 to 1.
     standard_error : Of the share.
+
+    Examples
+    --------
+    >>> import ident
+    >>> ident.VarianceShare("N_v", 0.6, 0.1).share
+    0.6
     """
 
     coefficient: str
@@ -54,6 +60,14 @@ class BandSummary:
     seed : Of the random generator.
     inside : Source -> channel -> level -> share of the reference's points inside the band.
     variance_shares : Channel -> coefficients, surest first.
+
+    Examples
+    --------
+    >>> import ident
+    >>> done = ident.validate("my-boat/zigzag.toml", db="coeff_db", version=0)
+    >>> summary = done.with_bands(8, seed=1).band_summary
+    >>> summary.samples, sorted(summary.inside["TRIAL"]["psi"])
+    (8, ['50', '95'])
     """
 
     samples: int

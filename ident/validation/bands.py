@@ -61,6 +61,15 @@ class Bands:
     failed : Samples without a self-propulsion state.
     seed : Of the random generator.
     metrics : Metrics of each sample, as ``ident.metrics.measure`` names them.
+
+    Examples
+    --------
+    >>> import ident
+    >>> done = ident.validate("my-boat/zigzag.toml", db="coeff_db", version=0)
+    >>> bands = done.with_bands(8, seed=1).bands
+    >>> low, high = bands.band("psi", "95")
+    >>> bool((low <= high).all()), bands.draws.shape == (8, len(bands.estimates))
+    (True, True)
     """
 
     time: Array

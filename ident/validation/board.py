@@ -8,10 +8,14 @@ from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from ident.output import html_table
 from ident.validation.coverage import used_rows
 from ident.validation.reliability import Reliability, mean_shares, ranks, reliability
+from sim.boat.database import version_words
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from ident.validation.result import ChannelError, Validation
 
 
@@ -29,6 +33,12 @@ class ComparedError:
     error : Of the version, beside the published model.
     parent_rmse : Of the version that it came from, in the same unit; None without one.
     measured_only_rmse : Of what the runs alone gave; None where the version has no estimates.
+
+    Examples
+    --------
+    >>> import ident
+    >>> ident.ComparedError(ident.ChannelError(1.5, "deg", 40), parent_rmse=3.0).ratio_to_parent
+    0.5
     """
 
     error: ChannelError
@@ -75,6 +85,13 @@ class BoardCase:
     errors : Source -> channel -> error.
     validation : The flight; None where there was none.
     failed : Why there was none: no state of self-propulsion to start from.
+
+    Examples
+    --------
+    >>> import ident
+    >>> case = ident.BoardCase("zigzag", {"version": 0}, trained=False, failed="no self-propulsion")
+    >>> case.to_dict()["failed"]
+    'no self-propulsion'
     """
 
     name: str
@@ -157,6 +174,13 @@ class Scoreboard:
     database : Path, version and digest.
     cases : In the order they were asked for.
     trained_on : Vehicle -> what its coefficients were trained on: names of cases, or case:source.
+
+    Examples
+    --------
+    >>> import ident
+    >>> board = ident.scoreboard(db="coeff_db", cases=["my-boat/zigzag.toml"])
+    >>> [case.name for case in board.cases], board.table["rmse"].gt(0.0).all().item()
+    (['my-zigzag'], True)
     """
 
     database: dict[str, Any]
@@ -172,6 +196,24 @@ class Scoreboard:
     def comparisons(self) -> tuple[Comparison, ...]:
         """Every error of the board."""
         return tuple(comparisons(self.cases))
+
+    @property
+    def table(self) -> pd.DataFrame:
+        """One row a case, source and channel: the fields of ``ComparedError.to_dict``."""
+        import pandas as pd
+
+        rows = {(c.case.name, c.source, c.channel): c.compared.to_dict() for c in self.comparisons}
+        index = pd.MultiIndex.from_tuples(list(rows), names=["case", "source", "channel"]) if rows else None
+        return pd.DataFrame(list(rows.values()), index=index)
+
+    def _repr_html_(self) -> str:
+        rows = [
+            (c.case.name, c.source, c.channel, f"{e.rmse:.4g}", e.unit, None if e.ratio is None else f"{e.ratio:.2f}")
+            for c in self.comparisons
+            for e in (c.compared.error,)
+        ]
+        heads = ("case", "reference", "channel", "RMSE", "unit", "ratio to published model")
+        return html_table(f"{len(self.cases)} cases; {version_words(self.database)}", heads, rows)
 
     @property
     def mean_ratio(self) -> ByTraining:

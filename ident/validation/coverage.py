@@ -29,6 +29,13 @@ class OutsideUse:
     ----------
     term, axis : Which term, along which axis; ``alpha x beta`` where no run has both angles.
     fraction_of_time : Share of the flight, 0 to 1.
+
+    Examples
+    --------
+    >>> import ident
+    >>> done = ident.validate("my-boat/zigzag.toml", db="coeff_db", version=0)
+    >>> all(0.0 <= use.fraction_of_time <= 1.0 for use in done.outside_tables)
+    True
     """
 
     term: str

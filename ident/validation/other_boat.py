@@ -204,6 +204,13 @@ class Saturated:
     actuator : A plane, or n.
     limit, unit : The limit, in its unit.
     share_of_time : Share of the flight, 0 to 1.
+
+    Examples
+    --------
+    >>> import ident
+    >>> done = ident.validate("my-boat/zigzag.toml", db="coeff_db", version=0)
+    >>> [one.actuator for one in done.saturated if one.share_of_time > 0.5]
+    []
     """
 
     actuator: str

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable, Collection
+from collections.abc import Collection, Iterable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
+from ident.output import Tell, silent
 from ident.validation.board import BoardCase, ComparedError, Parent, Scoreboard
 from ident.validation.boats import Boat, Fleet
 from ident.validation.result import ChannelError, Validation
@@ -20,8 +21,8 @@ from sim.flight.case import load_case
 from sim.flight.trim import NoEquilibrium
 
 
-def case_names(folder: Path | None) -> list[str]:
-    """Bundled cases, and the case files of a user's folder.
+def case_names(own: str | os.PathLike[str] | Iterable[str | os.PathLike[str]] | None) -> list[str]:
+    """Bundled cases, and a user's own: those of a folder, or the files named.
 
     Raises
     ------
@@ -29,8 +30,11 @@ def case_names(folder: Path | None) -> list[str]:
         When the folder does not exist or holds no case file.
     """
     names = bundled("cases")
-    if folder is None:
+    if own is None:
         return names
+    if not isinstance(own, str | os.PathLike):
+        return names + [os.fspath(one) for one in own]
+    folder = Path(own)
     beside = sorted(str(p) for p in folder.glob("*.toml")) if folder.is_dir() else []
     if not beside:
         raise InputError(str(folder), "no case file", "a folder with case files (*.toml)")
@@ -109,23 +113,24 @@ def _one(name: str, fleet: Fleet) -> BoardCase:
     return _beside_other_versions(done, fleet, is_trained(done.case.name, trained_on(boat)))
 
 
-def run_all(
-    db: str,
-    version: int | None,
-    folder: Path | None,
-    each: Callable[[str], None] = lambda name: None,
+def scoreboard(
+    db: str | os.PathLike[str] = "coeff_db",
+    version: int | None = None,
+    *,
+    cases: str | os.PathLike[str] | Iterable[str | os.PathLike[str]] | None = None,
+    without: Collection[str] = (),
     workers: int | None = None,
-    left_out: Collection[str] = (),
+    tell: Tell = silent,
 ) -> Scoreboard:
     """Fly every case from one version; bundled cases only of vehicles it holds.
 
     Parameters
     ----------
-    db, version : Database and version, latest when None.
-    folder : Users' own cases beside the bundled ones.
-    each : Called with the name of each case before it is flown.
+    db, version : Folder or URL of the database, and version, latest when None.
+    cases : Folder of users' own cases beside the bundled ones, or their files.
+    without : Terms and estimates that the version is flown without.
     workers : Threads; all cores when None. The result does not depend on it.
-    left_out : Terms and estimates that the version is flown without.
+    tell : Called with the name of each case before it is flown, its place and how many there are.
 
     Returns
     -------
@@ -134,20 +139,27 @@ def run_all(
     Raises
     ------
     InputError
-        As ``ident.validation.validate.validate``.
-    """
-    fleet = Fleet(db, version, left_out)
-    names = _flyable(case_names(folder), fleet.vehicles)
+        For a database, version or case that does not exist or fit.
 
-    def one(name: str) -> BoardCase:
-        each(name)
+    Examples
+    --------
+    >>> import ident
+    >>> board = ident.scoreboard(db="coeff_db", cases=["my-boat/zigzag.toml"])
+    >>> board.cases[0].errors["TRIAL"]["psi"].error.unit
+    'deg'
+    """
+    fleet = Fleet(os.fspath(db), version, without)
+    names = _flyable(case_names(cases), fleet.vehicles)
+
+    def one(place: int, name: str) -> BoardCase:
+        tell(name, place, len(names))
         return _one(name, fleet)
 
     with ThreadPoolExecutor(workers or os.cpu_count()) as pool:
-        cases = tuple(pool.map(one, names))
+        flown = tuple(pool.map(one, range(len(names)), names))
     boats = {vehicle.name: fleet.boat(vehicle) for vehicle in map(_vehicle_of, names)}
     return Scoreboard(
-        database={"path": db, "version": fleet.number, "digest": fleet.record.digest},
-        cases=cases,
+        database={"path": fleet.db, "version": fleet.number, "digest": fleet.record.digest},
+        cases=flown,
         trained_on={name: trained_on(boat) for name, boat in boats.items()},
     )

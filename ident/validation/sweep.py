@@ -35,6 +35,12 @@ class SweepPoint:
     ballast_kg, trim_tank_m : Ballast [kg], shift of the centre of gravity [m].
     limited : Actuators at their limit.
     reason : Why there is none.
+
+    Examples
+    --------
+    >>> import ident
+    >>> ident.SweepPoint(speed_mps=2.0, depth_m=20.0, reason="no equilibrium").n_rps is None
+    True
     """
 
     speed_mps: float

@@ -21,6 +21,13 @@ class Series:
 
     ``self[source][channel]`` is a ``Record`` over time [s] or path length [m]; its ``sigma`` is the
     standard error of reading the value, where stated.
+
+    Examples
+    --------
+    >>> import ident
+    >>> reference = ident.validate("my-boat/zigzag.toml", db="coeff_db", version=0).reference
+    >>> reference["TRIAL"]["psi"].unit
+    'rad'
     """
 
     def __init__(self, data: dict[str, dict[str, Record]], abscissa: Literal["t", "s"] = "t") -> None:

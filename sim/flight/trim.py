@@ -39,6 +39,13 @@ class Trim:
     limited : Which of ballast and trim_tank stand at their limit, so that pitch or planes
         hold what they cannot.
     lateral : Shift of the weight to starboard that keeps the boat upright [m].
+
+    Examples
+    --------
+    >>> import ident
+    >>> flight = ident.validate("my-boat/zigzag.toml", db="coeff_db", version=0).simulation
+    >>> flight.trim is None or flight.trim.residual < 1e-6
+    True
     """
 
     state: Array
