@@ -11,7 +11,7 @@ from scipy.sparse import csr_array, random_array
 
 from ident.captive.campaign import read_campaign
 from ident.captive.run_table import MEASURED, run_table, sigma
-from ident.checks.check import run
+from ident.checks.check import findings_of
 from ident.checks.findings import Evidence
 from ident.fitting.bench import recorded, repeated_campaign, worse
 from ident.fitting.fit import fit
@@ -136,9 +136,9 @@ def test_loads_that_agree_by_chance_are_no_frozen_column_and_a_frozen_one_is():
     columns = {"test": "towing", "part": "hull", "file": "a.csv", "U": 1.0 + np.arange(3000) / 1000.0, "X": load}
     columns |= {"run_id": [str(i) for i in range(3000)], "Z": make.normal(size=3000)}
     assert len(np.unique(load)) < 3000
-    assert not [f for f in run(Evidence(runs=run_table(columns))) if f.check == "frozen_column"]
+    assert not [f for f in findings_of(Evidence(runs=run_table(columns))) if f.check == "frozen_column"]
     load[200:240] = 123457.0
-    (found,) = (f for f in run(Evidence(runs=run_table(columns | {"X": load}))) if f.check == "frozen_column")
+    (found,) = (f for f in findings_of(Evidence(runs=run_table(columns | {"X": load}))) if f.check == "frozen_column")
     assert found.columns == ("X",)
     assert set(range(202, 242)) <= set(found.rows)
 

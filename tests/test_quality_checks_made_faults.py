@@ -20,7 +20,7 @@ from click.testing import CliRunner
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ident.checks.check import evidence_of, run
+from ident.checks.check import evidence_of, findings_of
 from ident.checks.copies import digits
 from ident.checks.findings import registered, rules, spans
 from ident.checks.tables import vertical_partner
@@ -40,7 +40,7 @@ def evidence(campaign):
 
 @pytest.fixture(scope="module")
 def bundled(evidence):
-    return run(evidence)
+    return findings_of(evidence)
 
 
 def only(evidence, names, change):
@@ -229,7 +229,7 @@ def test_no_number_stops_the_checks(evidence, data):
         row = data.draw(st.integers(0, len(runs) - 1))
         runs.loc[row, data.draw(st.sampled_from(columns))] = data.draw(odd)
     altered = replace(evidence, runs=runs, campaign=replace(evidence.campaign, runs=runs), memo={})
-    assert all(f.what and f.remedy and f.file for f in run(altered))
+    assert all(f.what and f.remedy and f.file for f in findings_of(altered))
 
 
 @settings(max_examples=60, deadline=None)

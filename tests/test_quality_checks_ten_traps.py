@@ -15,13 +15,13 @@ import pytest
 from hmri import DATASETS, HMRI, KVLCC2, PMM, STATIC, sheet
 
 from ident.captive.run_table import run_table
-from ident.checks.check import read_labels, run
+from ident.checks.check import findings_of, read_labels
 from ident.checks.findings import Evidence
 from ident.checks.histories import time_stamps
 
 
 def found(evidence: Evidence, check: str) -> list:
-    return [f for f in run(evidence) if f.check == check]
+    return [f for f in findings_of(evidence) if f.check == check]
 
 
 def derivative_table(name: str, value: str = "value") -> pd.DataFrame:
