@@ -21,7 +21,7 @@ from sim.flight.case import load_case
 from sim.flight.trim import NoEquilibrium
 
 
-def case_names(own: str | os.PathLike[str] | Iterable[str | os.PathLike[str]] | None) -> list[str]:
+def case_names(cases: str | os.PathLike[str] | Iterable[str | os.PathLike[str]] | None) -> list[str]:
     """Bundled cases, and a user's own: those of a folder, or the files named.
 
     Raises
@@ -30,11 +30,11 @@ def case_names(own: str | os.PathLike[str] | Iterable[str | os.PathLike[str]] | 
         When the folder does not exist or holds no case file.
     """
     names = bundled("cases")
-    if own is None:
+    if cases is None:
         return names
-    if not isinstance(own, str | os.PathLike):
-        return names + [os.fspath(one) for one in own]
-    folder = Path(own)
+    if not isinstance(cases, str | os.PathLike):
+        return names + [os.fspath(one) for one in cases]
+    folder = Path(cases)
     beside = sorted(str(p) for p in folder.glob("*.toml")) if folder.is_dir() else []
     if not beside:
         raise InputError(str(folder), "no case file", "a folder with case files (*.toml)")
