@@ -52,7 +52,7 @@ GRID_ERROR = 0.01
 @pytest.fixture(scope="module")
 def written(tmp_path_factory) -> Path:
     folder = write_files(tmp_path_factory.mktemp("lines"))
-    ident.plan_cases(
+    batch = ident.plan_cases(
         folder / "captive",
         folder / "hull.stl",
         folder / "template.toml",
@@ -60,6 +60,8 @@ def written(tmp_path_factory) -> Path:
         0.1,
         folder / "facility.toml",
     )
+    assert "new of" in repr(batch)
+    assert len(repr(batch)) < 400
     return folder
 
 

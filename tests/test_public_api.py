@@ -134,7 +134,9 @@ def test_results_have_a_table_for_a_notebook(desk, planned):
         page = one._repr_html_()
         assert page.count("<table>") == page.count("</table>") >= 1
         assert "<td>" in page or type(one) is ident.Difference
-    for one in shown[:6]:
+    flown = ident.validate(case)
+    shown += [flown.simulation, ident.fit(folder)[0].identification, flown.with_bands(8).bands]
+    for one in [*shown, ident.scoreboard(cases=[case])]:
         assert "\n" not in repr(one)
         assert len(repr(one)) < 200
 

@@ -51,6 +51,12 @@ class Batch:
     outstanding: tuple[str, ...]
     unreached: tuple[str, ...] = ()
 
+    def __repr__(self) -> str:
+        if self.matrix is None:
+            return f"Batch({self.plan!r}; no case written)"
+        made = f"{len(self.matrix.new)} new of {len(self.matrix.cases)} cases"
+        return f"Batch({self.plan!r}; {made} in {self.matrix.folder})"
+
     def to_dict(self) -> dict[str, Any]:
         """For a program to read."""
         made = None if self.matrix is None else self.matrix.to_dict()

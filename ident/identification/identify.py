@@ -68,6 +68,10 @@ class Identification:
     warnings: list[tuple[str, str]]
     between: tuple[Between, ...] = ()
 
+    def __repr__(self) -> str:
+        name, count = self.campaign.header.name, len(self.values)
+        return f"Identification({name}: {count} values, {len(self.unused)} loads unused)"
+
     @cached_property
     def _members(self) -> dict[tuple[str, str], list[int]]:
         return by_coefficient(self.nodes)

@@ -84,6 +84,9 @@ class Bands:
     _edges: dict[tuple[str, str], dict[float, Array]] = field(default_factory=dict, repr=False, compare=False)
     _scores: dict[str, Array] = field(default_factory=dict, repr=False, compare=False)
 
+    def __repr__(self) -> str:
+        return f"Bands({len(self.draws)} samples of {len(self.estimates)} estimates, {len(self.channels)} channels)"
+
     def of(self, source: str) -> dict[str, Array]:
         """Channels as a source's record starts, which are those of the case where it has no start of its own."""
         return self.as_started.get(source, self.channels)

@@ -206,6 +206,9 @@ class Scoreboard:
         index = pd.MultiIndex.from_tuples(list(rows), names=["case", "source", "channel"]) if rows else None
         return pd.DataFrame(list(rows.values()), index=index)
 
+    def __repr__(self) -> str:
+        return f"Scoreboard({len(self.cases)} cases; {version_words(self.database)})"
+
     def _repr_html_(self) -> str:
         rows = [
             (c.case.name, c.source, c.channel, f"{e.rmse:.4g}", e.unit, None if e.ratio is None else f"{e.ratio:.2f}")

@@ -77,6 +77,9 @@ class Simulation:
     end: Array
     waves: Waves | None = None
 
+    def __repr__(self) -> str:
+        return f"Simulation({len(self.record)} records of {len(self.columns)} columns to t = {self.end[0]:g} s)"
+
     def __getitem__(self, column: str) -> Array:
         """One column by name; those of ``DERIVED``, are computed.
 
