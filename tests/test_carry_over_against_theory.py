@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from ident.estimates import carry_over as c
 from ident.estimates.downwash import tail_downwash, vortex_pair
 from sim.boat.vehicle import load_vehicle
 from sim.files.errors import InputError
+from sim.flight.simulate import mixer_of
 from sim.hull.lattice import horseshoes
 
 
@@ -121,3 +123,36 @@ def test_downwash_raises_the_sail_planes_pitch_moment_and_takes_lift(bb2, rows, 
     assert angle["stern_plane_2"] == pytest.approx(-angle["stern_plane_3"], abs=1e-9)
     # The upper planes stand nearer to the vortices.
     assert abs(angle["stern_plane_2"]) > abs(angle["stern_plane_1"])
+
+
+def renamed(vehicle, names):
+    """The vehicle and its foils under other names of planes."""
+    planes = [p.model_copy(update={"name": names[p.name], "mirror": names[p.mirror]}) for p in vehicle.planes]
+    return vehicle.model_copy(update={"planes": planes})
+
+
+def test_which_planes_are_at_the_stern_is_seen_by_their_place_not_their_names(bb2, planes, tmp_path):
+    """Aft of the origin they are at the stern, whatever they are called: other names, the same ratios."""
+    names = {p.name: f"sail_fin_{i}" if p.is_aft else "stern_of_the_sail" for i, p in enumerate(bb2.planes)}
+    other = renamed(bb2, names)
+    folder = Path(bb2.geometry).parent
+    for file in folder.iterdir():
+        text = file.read_text(encoding="utf-8")
+        for old, new in names.items():
+            text = text.replace(f",{old},", f",{new},")
+        (tmp_path / file.name).write_text(text, encoding="utf-8")
+    other = other.model_copy(update={"geometry": str(tmp_path / "geometry.toml")})
+    assert c.carry_over(other) == planes
+    assert mixer_of(other, sail_planes=False).tolist() == mixer_of(bb2, sail_planes=False).tolist()
+    assert [bool(row.any()) for row in mixer_of(other, sail_planes=False)] == [p.is_aft for p in bb2.planes]
+
+
+def test_a_foil_of_no_plane_is_refused(bb2, tmp_path):
+    path = tmp_path / "foils.csv"
+    text = (Path(bb2.geometry).parent / "foils.csv").read_text(encoding="utf-8")
+    path.write_text(text.replace(",stern_plane_2,0", ",stern_plane_9,0"), encoding="utf-8")
+    with pytest.raises(InputError, match="row 5, column plane"):
+        c.foils_of(bb2, path)
+    path.write_text(text.replace(",plane,", ",Plane,", 1), encoding="utf-8")
+    with pytest.raises(InputError, match="no columns plane and fixed"):
+        c.foils_of(bb2, path)

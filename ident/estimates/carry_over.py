@@ -42,6 +42,7 @@ class CarryOver:
     roll_factor, roll_sigma : Roll moment about the hull's axis.
     incidence_factor : Load of the moving plane by hull incidence on that by its deflection.
     sail_factor, sail_sigma : Lift of the sail planes with their fixed roots.
+    sail_tip : Distance of the sail planes' tips from the centre plane [m].
     lift_slope : Of the moving stern plane on its own area, by the lattice [1/rad].
     area : Of a moving stern plane [m^2].
     parts : Shares of root, hull and other fins in ``force_factor``.
@@ -55,6 +56,7 @@ class CarryOver:
     incidence_factor: float
     sail_factor: float
     sail_sigma: float
+    sail_tip: float
     lift_slope: float
     area: float
     parts: dict[str, float]
@@ -72,7 +74,7 @@ def stern_factors(fins: list[Fin], radius: float, counts: tuple[int, int, int] =
 
     Returns
     -------
-    ``on_plane`` (load over density, speed^2 and angle [m^2]), and on it: ``root``, ``hull``,
+    ``plane`` (load on it over density, speed^2 and angle [m^2]), and over that: ``root``, ``hull``,
     ``others``, ``force`` (their sum with the plane), ``roll`` (of all fins), and ``incidence``.
     """
     grid = lattice(fins, counts)
@@ -96,7 +98,7 @@ def stern_factors(fins: list[Fin], radius: float, counts: tuple[int, int, int] =
     root = float(loads[(grid.fin == 0) & ~grid.moving].sum())
     others = float(loads[grid.fin != 0].sum())
     return {
-        "own": abs(on_plane),
+        "plane": abs(on_plane),
         "root": root / on_plane,
         "hull": hull / on_plane,
         "others": others / on_plane,
@@ -115,8 +117,34 @@ def wall_factor(fin: Fin, wall: float, counts: tuple[int, int, int] = FINE) -> f
     return float(loads.sum() / loads[grid.moving].sum())
 
 
-def _parts(vehicle: Vehicle) -> tuple[pd.DataFrame, Hull, pd.DataFrame]:
-    """Foils, hull and offsets of the sail of a vehicle's geometry file."""
+def foils_of(vehicle: Vehicle, path: Path) -> tuple[pd.DataFrame, pd.DataFrame]:
+    """Foils of the vehicle's stern planes and of those further forward, by the plane each belongs to.
+
+    Parameters
+    ----------
+    vehicle : Whose planes.
+    path : Table of foils of its geometry.
+
+    Raises
+    ------
+    InputError
+        For a table that does not say which foil is which plane's, or names a plane that the vehicle lacks.
+    """
+    foils = pd.read_csv(path)
+    if not {"plane", "fixed"} <= set(foils):
+        raise InputError(
+            str(path), "no columns plane and fixed", "the vehicle's plane of each foil; 1 for a fixed root"
+        )
+    names = {p.name for p in vehicle.planes}
+    for row, plane in enumerate(foils["plane"]):
+        if plane not in names and not pd.isna(plane):
+            raise InputError(f"{path}, row {row + 2}, column plane", repr(plane), ", ".join(sorted(names)))
+    stern, forward = ([p.name for p in planes] for planes in (vehicle.stern_planes, vehicle.forward_planes))
+    return foils[foils["plane"].isin(stern)], foils[foils["plane"].isin(forward)]
+
+
+def _parts(vehicle: Vehicle) -> tuple[pd.DataFrame, pd.DataFrame, Hull, pd.DataFrame]:
+    """Foils of stern and forward planes, hull, and offsets of the sail of a vehicle's geometry file."""
     if vehicle.geometry is None:
         raise InputError(f"vehicle {vehicle.name}", "no geometry file", "key geometry, with hull, sail and foils")
     data, where = read_toml(vehicle.geometry, "vehicles")
@@ -124,34 +152,37 @@ def _parts(vehicle: Vehicle) -> tuple[pd.DataFrame, Hull, pd.DataFrame]:
     if not {"hull", "sail", "foils"} <= set(parts):
         raise InputError(where, f"parts {', '.join(sorted(parts))}", "hull, sail and foils")
     folder = Path(where).parent
-    foils = pd.read_csv(folder / parts["foils"].offsets).set_index("name")
-    return foils, hull_of(folder / parts["hull"].offsets), pd.read_csv(folder / parts["sail"].offsets)
+    stern, forward = foils_of(vehicle, folder / parts["foils"].offsets)
+    return stern, forward, hull_of(folder / parts["hull"].offsets), pd.read_csv(folder / parts["sail"].offsets)
 
 
 def _stern_fins(foils: pd.DataFrame, gap: float, radius: float) -> list[Fin]:
     """The stern fins with the gap between its leading- (0) and trailing-edge (1) place."""
-    rows = {str(k): {str(c): float(x) for c, x in row.items()} for k, row in foils.iterrows()}
+    roots = {root.plane: root for root in foils[foils["fixed"] == 1].itertuples()}
     fins = []
-    for name, plane in rows.items():
-        if not name.startswith("stern_plane"):
-            continue
-        root = rows[name.replace("stern_plane", "stern_root")]
-        cut = plane["LE_root_s_m"] + gap * (plane["TE_root_s_m"] - plane["LE_root_s_m"])
-        tip = 0.5 * (plane["LE_tip_s_m"] + plane["TE_tip_s_m"])
+    for plane in foils[foils["fixed"] == 0].itertuples():
+        root = roots[plane.plane]
+        cut = plane.LE_root_s_m + gap * (plane.TE_root_s_m - plane.LE_root_s_m)
+        tip = 0.5 * (plane.LE_tip_s_m + plane.TE_tip_s_m)
         chords = (
-            (radius, root["LE_root_x_m"], root["TE_root_x_m"]),
-            (cut, root["LE_tip_x_m"], root["TE_tip_x_m"]),
-            (tip, plane["LE_tip_x_m"], plane["TE_tip_x_m"]),
+            (radius, root.LE_root_x_m, root.TE_root_x_m),
+            (cut, root.LE_tip_x_m, root.TE_tip_x_m),
+            (tip, plane.LE_tip_x_m, plane.TE_tip_x_m),
         )
-        fins.append(Fin(chords, float(np.arctan2(plane["span_z"], plane["span_y"]))))
+        fins.append(Fin(chords, float(np.arctan2(plane.span_z, plane.span_y))))
     return fins
 
 
-def _sail_fin(foils: pd.DataFrame, wall: float) -> Fin:
-    plane = {str(k): float(x) for k, x in foils[foils.index.str.startswith("sail_plane")].iloc[0].items()}
+def _sail_fin(plane: pd.Series, wall: float) -> Fin:
     inner = (plane["LE_root_x_m"], plane["TE_root_x_m"])
     outer = (plane["LE_tip_s_m"], plane["LE_tip_x_m"], plane["TE_tip_x_m"])
     return Fin(((wall, *inner), (plane["LE_root_s_m"], *inner), outer), 0.0)
+
+
+def _on_the_sail(forward: pd.DataFrame, sail: pd.DataFrame) -> pd.DataFrame:
+    """Those of the moving foils whose chord at the root lies on the sail."""
+    begins, ends = sail["x_m"].min(), sail["x_m"].max()
+    return forward[(forward["fixed"] == 0) & (forward["LE_root_x_m"] >= begins) & (forward["TE_root_x_m"] <= ends)]
 
 
 def carry_over(vehicle: Vehicle) -> CarryOver:
@@ -167,10 +198,12 @@ def carry_over(vehicle: Vehicle) -> CarryOver:
     InputError
         When the vehicle has no geometry with hull, sail, stern and sail planes.
     """
-    foils, hull, sail = _parts(vehicle)
-    roots = foils[foils.index.str.startswith("stern_root")]
-    if roots.empty or not foils.index.str.startswith("sail_plane").any():
-        raise InputError(f"vehicle {vehicle.name}", "no stern or sail planes among the foils", "both")
+    foils, forward, hull, sail = _parts(vehicle)
+    roots, moving = foils[foils["fixed"] == 1], foils[foils["fixed"] == 0]
+    on_sail = _on_the_sail(forward, sail)
+    if on_sail.empty or moving.empty or not set(moving["plane"]) <= set(roots["plane"]):
+        where = f"vehicle {vehicle.name}, foils of its geometry"
+        raise InputError(where, "no planes on the sail, or none at the stern with fixed roots", "both")
     edges = np.array([roots["LE_root_x_m"].mean(), roots["TE_root_x_m"].mean()])
     radii = [float(np.ravel(hull.radius(edges[i : i + 1], np.array([np.pi / 4.0])))[0]) for i in (0, 1)]
     middle = float(np.mean(radii))
@@ -184,20 +217,21 @@ def carry_over(vehicle: Vehicle) -> CarryOver:
         halves = [0.25 * abs(factors[i][key] - factors[i + 1][key]) for i in (0, 2)]
         return float(np.sqrt(halves[0] ** 2 + halves[1] ** 2 + (best[key] - coarse[key]) ** 2))
 
-    plane = foils[foils.index.str.startswith("sail_plane")].iloc[0]
+    plane = on_sail.iloc[0]
     chord = np.linspace(plane["LE_root_x_m"], plane["TE_root_x_m"], 9)
     walls = np.interp(chord, sail["x_m"], sail["y_wall_m"])
     wall = float(walls.mean())
-    on_sail = [wall_factor(_sail_fin(foils, w), w) for w in (float(walls.min()), float(walls.max()))]
+    by_wall = [wall_factor(_sail_fin(plane, w), w) for w in (float(walls.min()), float(walls.max()))]
     return CarryOver(
         force_factor=best["force"],
         force_sigma=sigma("force"),
         roll_factor=best["roll"],
         roll_sigma=sigma("roll"),
         incidence_factor=best["incidence"],
-        sail_factor=wall_factor(_sail_fin(foils, wall), wall),
-        sail_sigma=0.25 * abs(on_sail[0] - on_sail[1]),
-        lift_slope=2.0 * best["own"] / _area(_stern_fins(foils, 0.5, middle)[0]),
+        sail_factor=wall_factor(_sail_fin(plane, wall), wall),
+        sail_sigma=0.25 * abs(by_wall[0] - by_wall[1]),
+        sail_tip=float((0.5 * (on_sail["LE_tip_s_m"] + on_sail["TE_tip_s_m"])).mean()),
+        lift_slope=2.0 * best["plane"] / _area(_stern_fins(foils, 0.5, middle)[0]),
         area=_area(_stern_fins(foils, 0.5, middle)[0]),
         parts={k: best[k] for k in ("root", "hull", "others")},
         method="vortex lattice of the fins with the hull as a cylinder by images (after NACA Report 1307)",

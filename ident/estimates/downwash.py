@@ -11,19 +11,17 @@ NACA Report 1307). The campaign measured each plane alone, so it is in none of i
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
 from sim.boat.vehicle import Vehicle
 from sim.files.errors import InputError
-from sim.files.toml_files import read_toml
-from sim.hull.surface import Geometry
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from ident.estimates.carry_over import CarryOver
     from sim.boat.vehicle import Plane
 
@@ -95,23 +93,6 @@ def slopes(rows: pd.DataFrame, part: str, depth: float, speed: float) -> dict[st
     return slope_of
 
 
-def _tip(vehicle: Vehicle) -> float:
-    """Distance of the sail planes' tips from the centre plane [m]."""
-    if vehicle.geometry is None:
-        raise InputError(f"vehicle {vehicle.name}", "no geometry file", "key geometry, with the planes as foils")
-    data, where = read_toml(vehicle.geometry, "vehicles")
-    spans = []
-    for part in Geometry.model_validate(data).parts:
-        if part.kind != "foils":
-            continue
-        table = pd.read_csv(Path(where).parent / part.offsets)
-        of_sail = table[table["name"].str.startswith("sail_plane")]
-        spans += list(0.5 * (of_sail["LE_tip_s_m"] + of_sail["TE_tip_s_m"]))
-    if not spans:
-        raise InputError(where, "no sail planes among the foils", "foils named sail_plane...")
-    return float(np.mean(spans))
-
-
 def _coefficient_changes(
     rows: pd.DataFrame, tails: list[Plane], sail: Plane, half: float, length: float, at: tuple[float, float]
 ) -> tuple[dict[str, float], dict[str, float], dict[str, float]]:
@@ -135,22 +116,22 @@ def tail_downwash(vehicle: Vehicle, rows: pd.DataFrame, planes: CarryOver) -> Ta
 
     Parameters
     ----------
-    vehicle : With planes ``sail_planes`` and ``stern_plane...`` and their geometry.
+    vehicle : With planes at the stern and one pair on the sail.
     rows : Captive database rows, for the measured lift slopes (deepest, fastest runs).
     planes : What stern and sail planes carry over to their roots and the hull.
 
     Raises
     ------
     InputError
-        When the vehicle has no such planes, or no geometry.
+        When the vehicle has no such planes.
     """
-    sails = [p for p in vehicle.planes if p.name == "sail_planes"]
-    tails = [p for p in vehicle.planes if p.name.startswith("stern_plane")]
-    if not sails or not tails:
-        raise InputError(f"vehicle {vehicle.name}", "no sail planes or no stern planes", "both, for a tail downwash")
-    runs = rows[rows["part"] == "sail_planes"]
+    sails, tails = vehicle.forward_planes, vehicle.stern_planes
+    if len(sails) != 1 or not tails:
+        text = f"{len(sails)} planes on sail or bow, {len(tails)} at the stern"
+        raise InputError(f"vehicle {vehicle.name}", text, "one pair that moves together and any at the stern")
+    runs = rows[rows["part"] == sails[0].name]
     at = (float(runs["depth_m"].max()), float(runs["speed_mps"].max()))
-    half = _ROLLED_UP * _tip(vehicle)
+    half = _ROLLED_UP * planes.sail_tip
     by_runs, added, incidence = _coefficient_changes(rows, tails, sails[0], half, vehicle.particulars.length.value, at)
     change = {k: planes.force_factor * added[k] / by_runs[k] for k in added}
     factor = {k: planes.sail_factor * (1.0 + x) for k, x in change.items()}

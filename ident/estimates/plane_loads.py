@@ -14,7 +14,6 @@ from ident.estimates.draft import Draft, NotApplicable
 from sim.files.constants import constant
 from sim.files.errors import InputError
 
-_STERN = ("stern_plane_*",)
 # Lift of a real surface on that of a lattice, and its deviation: the boundary layer takes some per cent of the
 # slope of a section, and lattices are as good as that at small aspect ratio.
 _VISCOUS, _LATTICE = constant("lift_on_lattice"), constant("lift_on_lattice_range")
@@ -31,12 +30,12 @@ def lift_slope(draft: Draft, planes: CarryOver) -> tuple[float, float, float]:
     Factor on the measured slope, its deviation, and the measured slope on the planes' own area [1/rad].
     """
     rows = draft.rows
-    at = rows[rows["part"].str.startswith("stern_plane")]
+    at = rows[rows["part"].isin([p.name for p in draft.vehicle.stern_planes])]
     depth, speed = float(at["depth_m"].max()), float(at["speed_mps"].max())
     length = draft.vehicle.particulars.length.value
     measured_slopes = []
-    for plane in draft.vehicle.planes:
-        of_plane = slopes(rows, plane.name, depth, speed) if plane.name.startswith("stern_plane") else {}
+    for plane in draft.vehicle.stern_planes:
+        of_plane = slopes(rows, plane.name, depth, speed)
         if {"Y", "Z"} <= set(of_plane):
             along = plane.lift_axis[1] * of_plane["Y"] + plane.lift_axis[2] * of_plane["Z"]
             measured_slopes.append(abs(along) * length**2 / planes.area)
@@ -72,7 +71,8 @@ def carried_over(draft: Draft) -> str:
     NotApplicable
         Without stern planes or their geometry.
     """
-    if not draft.where(["Z_d*", "Y_d*"], _STERN).any():
+    stern = [p.name for p in draft.vehicle.stern_planes]
+    if not draft.where(["Z_d*", "Y_d*"], stern).any():
         raise NotApplicable("no loads of stern planes by part")
     try:
         planes = _planes(draft)
@@ -84,12 +84,12 @@ def carried_over(draft: Draft) -> str:
         (["[YZMN]_d*"], lift * force, lift * planes.force_sigma, "carry_over force"),
         (["K_d*"], lift * roll, lift * planes.roll_sigma, "carry_over roll"),
     ):
-        chosen = draft.where(terms, _STERN)
+        chosen = draft.where(terms, stern)
         by_lift = np.where(chosen, draft.value, 0.0) * factor / lift * wide
         draft.multiply(chosen, factor, sigma, unknown, f"carry_over x{factor:.3f}")
         draft.spread("lift slope", by_lift)
     drag, spread = 0.5 * (1.0 + force), float((force - 1.0) / np.sqrt(12.0))
-    draft.multiply(draft.where(["X_d*"], _STERN), drag, spread, "carry_over drag", f"carry_over x{drag:.3f}")
+    draft.multiply(draft.where(["X_d*"], stern), drag, spread, "carry_over drag", f"carry_over x{drag:.3f}")
     return (
         f"lift slope {measured:.2f} by runs and {_VISCOUS * planes.lift_slope:.2f} by lattice: "
         f"x{lift:.3f} +- {wide:.3f}; "
@@ -98,7 +98,7 @@ def carried_over(draft: Draft) -> str:
     )
 
 
-def sail_planes(draft: Draft) -> str:
+def forward_planes(draft: Draft) -> str:
     """Sail planes with their roots on the sail, and what their vortices do to the stern planes.
 
     Raises
@@ -106,8 +106,8 @@ def sail_planes(draft: Draft) -> str:
     NotApplicable
         Without sail planes, or without the geometry.
     """
-    chosen = draft.where(["[ZM]_d*"], ["sail_planes"])
-    if not chosen.any():
+    forward = [p.name for p in draft.vehicle.forward_planes]
+    if not draft.where(["[ZM]_d*"], forward).any():
         raise NotApplicable("no loads of sail planes by part")
     try:
         downwash = tail_downwash(draft.vehicle, draft.rows, _planes(draft))
@@ -115,14 +115,14 @@ def sail_planes(draft: Draft) -> str:
         raise NotApplicable(str(error)) from error
     force, moment = float(downwash.force_factor), float(downwash.moment_factor)
     draft.multiply(
-        draft.where(["Z_d*"], ["sail_planes"]),
+        draft.where(["Z_d*"], forward),
         force,
         downwash.force_sigma,
         "tail_downwash force",
         f"downwash x{force:.3f}",
     )
     draft.multiply(
-        draft.where(["M_d*"], ["sail_planes"]),
+        draft.where(["M_d*"], forward),
         moment,
         downwash.moment_sigma,
         "tail_downwash moment",

@@ -18,7 +18,7 @@ from ident.estimates.extrapolation import extrapolation
 from ident.estimates.facility import axial_in_drift, shared_errors
 from ident.estimates.lines import from_lines
 from ident.estimates.pitching import pure_pitch
-from ident.estimates.plane_loads import carried_over, sail_planes
+from ident.estimates.plane_loads import carried_over, forward_planes
 from ident.estimates.potential import unmeasured
 from ident.estimates.roll import roll_damping
 from ident.estimates.saturation import saturation
@@ -55,7 +55,7 @@ _WORK: dict[str, Callable[[Draft, Given], str]] = {
     "extrapolation": lambda draft, given: extrapolation(draft),
     "saturation": lambda draft, given: saturation(draft),
     "carry_over": lambda draft, given: carried_over(draft),
-    "tail_downwash": lambda draft, given: sail_planes(draft),
+    "tail_downwash": lambda draft, given: forward_planes(draft),
     "cross_flow": cross_flow,
     "pure_pitch": pure_pitch,
     "roll_damping": roll_damping,

@@ -306,6 +306,16 @@ class Vehicle(Data):
         """Propeller diameter [m]; 1 for a boat without one, none of whose terms has it."""
         return self.propeller.diameter.value if self.propeller else 1.0
 
+    @property
+    def stern_planes(self) -> list[Plane]:
+        """Planes aft of the body origin, by their place."""
+        return [p for p in self.planes if p.is_aft]
+
+    @property
+    def forward_planes(self) -> list[Plane]:
+        """Planes on the sail or at the bow: those that are not aft of the body origin."""
+        return [p for p in self.planes if not p.is_aft]
+
     def needed_propeller(self, what: str) -> Propeller:
         """The propeller, for what cannot be done without one.
 

@@ -115,7 +115,7 @@ class Case(Data):
     vehicle : Bundled vehicle, or a vehicle file beside the case.
     source : Where the case comes from.
     maneuver : What is measured on it; zigzags and roll decays need none.
-    sail_planes : Whether the sail planes follow dV.
+    sail_planes : Whether planes on the sail or at the bow (those not aft of the body origin) follow dV and dH.
     environment : Water and gravity.
     waves : Waves; calm without.
     initial : The state at the start.

@@ -110,10 +110,8 @@ def samples_of(case: Case) -> tuple[int, int]:
 
 
 def mixer_of(vehicle: Vehicle, sail_planes: bool = True) -> Array:
-    """(planes, 2) shares of dV and dH, Eq. (1); sail planes may be left out of it."""
-    rows = [
-        [p.mixer.dV, p.mixer.dH] if sail_planes or not p.name.startswith("sail") else [0.0, 0.0] for p in vehicle.planes
-    ]
+    """(planes, 2) shares of dV and dH, Eq. (1); planes on the sail or at the bow may be left out of it."""
+    rows = [[p.mixer.dV, p.mixer.dH] if sail_planes or p.is_aft else [0.0, 0.0] for p in vehicle.planes]
     return np.array(rows, dtype=float).reshape(-1, 2)
 
 

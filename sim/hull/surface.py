@@ -63,7 +63,11 @@ class SailPart(Data):
 
 
 class FoilParts(Data):
-    """Planes and roots, one a row of the table."""
+    """Planes and roots, one a row of the table.
+
+    A column ``plane`` names the vehicle's plane that a foil belongs to, and ``fixed`` says whether it is the root
+    that stays (1) or the part that moves (0): for estimates of what a deflected plane loads beside itself.
+    """
 
     kind: Literal["foils"]
     name: str
@@ -83,14 +87,14 @@ class Geometry(Data):
 
 
 def _table(path: Path, columns: list[str]) -> pd.DataFrame:
-    """A CSV of finite numbers (a column ``name`` aside) with at least these columns."""
+    """A CSV of finite numbers (columns of names aside) with at least these columns."""
     if not path.is_file():
         raise InputError(str(path), "no such file", "the offsets the geometry file names")
     table = pd.read_csv(path, dtype=str)
     for column in columns:
         if column not in table:
             raise InputError(str(path), f"column {column} missing", ", ".join(columns))
-    for column in table.columns.drop("name", errors="ignore"):
+    for column in table.columns.drop(["name", "plane"], errors="ignore"):
         numbers = pd.to_numeric(table[column], errors="coerce").astype(float)
         bad = np.flatnonzero(~np.isfinite(numbers))
         if bad.size:
