@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from ident.estimates.predict import Estimated
     from ident.fitting.fit import Fit, fit
     from ident.identification.identify import Identification
+    from ident.identification.noted import FitWarning, UnusedLoad
     from ident.metrics.in_waves import InWaves
     from ident.metrics.metric import Interval, Metric
     from ident.metrics.turning import SpiralPoint
@@ -105,6 +106,8 @@ _PLACES = {
     "OutsideUse": "ident.validation.coverage",
     "Saturated": "ident.validation.other_boat",
     "Identification": "ident.identification.identify",
+    "UnusedLoad": "ident.identification.noted",
+    "FitWarning": "ident.identification.noted",
     "Estimated": "ident.estimates.predict",
     "CalibrationSummary": "ident.calibration.result",
     "MultiplierGroup": "ident.calibration.result",
@@ -170,6 +173,8 @@ __all__ = [  # noqa: RUF022  (in the order of the work)
     "OutsideUse",
     "Saturated",
     "Identification",
+    "UnusedLoad",
+    "FitWarning",
     "Estimated",
     "CalibrationSummary",
     "MultiplierGroup",

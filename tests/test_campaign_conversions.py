@@ -290,8 +290,8 @@ def test_disagreement_beyond_the_errors_is_a_warning_that_names_the_runs(tmp_pat
     ]
     columns = "U_mps,alpha_deg,beta_deg,D0_m,Y_N,rel_sigma,sigma_Y_N"
     found = identify(read_campaign(small(tmp_path, lines, columns)))
-    assert {subject for subject, _ in found.warnings} == {"a", "b"}
-    assert all("Y_uvw" in message for _, message in found.warnings)
+    assert {one.subject for one in found.warnings} == {"a", "b"}
+    assert all("Y_uvw" in one.message for one in found.warnings)
     worst = {n.runs[0]: n.worst for n in found.nodes}
     assert worst["a"] == pytest.approx(50e3 / (10e3 * math.sqrt(2)), rel=1e-9)
     assert worst["c"] == pytest.approx(5e3 / (10e3 * math.sqrt(2)), rel=1e-9)
@@ -301,7 +301,7 @@ def test_load_that_symmetry_forbids_is_a_warning(tmp_path):
     lines = ["a,drift_horizontal,hull,as_published,s,,5,0,0,25,-300000,0.04"]
     lines += ["b,drift_horizontal,hull,as_published,s,,5,0,8,25,-300000,0.04"]
     found = identify(read_campaign(small(tmp_path, lines)))
-    assert [subject for subject, _ in found.warnings] == ["a"]
+    assert [one.subject for one in found.warnings] == ["a"]
 
 
 def test_angles_in_the_database_are_those_of_the_run_files(rows):
@@ -318,9 +318,9 @@ def test_angles_in_the_database_are_those_of_the_run_files(rows):
 
 def test_every_run_is_used_or_listed_with_a_reason(campaign, identification):
     used = {run for node in identification.nodes for run in node.runs}
-    listed = {run for run, *_ in identification.unused}
+    listed = {one.run_id for one in identification.unused}
     assert set(campaign.runs["run_id"]) == used | listed
-    assert all(reason.strip() for *_, reason in identification.unused)
+    assert all(one.reason.strip() for one in identification.unused)
 
 
 def test_every_load_is_used_listed_or_zero_by_symmetry(campaign, identification):
@@ -328,7 +328,7 @@ def test_every_load_is_used_listed_or_zero_by_symmetry(campaign, identification)
     for node in identification.nodes:
         for run in node.runs:
             outputs.setdefault(run, set()).add(term(node.name).output)
-    listed = {(run, output) for run, _, _, output, _ in identification.unused}
+    listed = {(one.run_id, one.output) for one in identification.unused}
     for run in campaign.runs.to_dict("records"):
         for output in (*FORCES, *MOMENTS):
             if pd.isna(run[output]) or output in outputs.get(run["run_id"], ()):
@@ -340,7 +340,7 @@ def test_every_load_is_used_listed_or_zero_by_symmetry(campaign, identification)
 def test_unused_loads_name_the_row_of_their_file(campaign, identification):
     rows_of = {r["run_id"]: (r["file"], r["row"]) for r in campaign.runs.to_dict("records")}
     assert identification.unused
-    for run, file, row, _, _ in identification.unused:
-        assert rows_of[run] == (file, row)
-        line = (BB2 / file).read_text("utf-8").splitlines()[row - 1]
-        assert line.startswith(run + ",")
+    for one in identification.unused:
+        assert rows_of[one.run_id] == (one.file, one.row)
+        line = (BB2 / one.file).read_text("utf-8").splitlines()[one.row - 1]
+        assert line.startswith(one.run_id + ",")

@@ -294,6 +294,8 @@ def test_database_keeps_the_covariance_of_the_identification(identification, row
 
 
 def test_rows_of_one_estimate_are_one_value_up_to_its_sign(rows):
-    for _, group in rows[rows["estimate"] >= 0].groupby("estimate"):
+    estimated = rows[rows["estimate"] >= 0]
+    assert estimated["estimate"].duplicated().any()
+    for _, group in estimated.groupby("estimate"):
         assert group["value"].abs().nunique() == 1
         assert group["stderr"].nunique() == 1

@@ -49,10 +49,11 @@ def test_the_six_things_run_as_they_stand(desk):
 
 def test_the_readme_runs_as_it_stands(desk):
     (block,) = _blocks("README.md")
-    exec(
-        compile(block.replace('[0]["N_uvw"]', '[-1]["N_uvw"]').replace("version=0", "version=1"), "README.md", "exec"),
-        {},
-    )
+    names: dict[str, object] = {}
+    latest = block.replace('[0]["N_uvw"]', '[-1]["N_uvw"]').replace("version=0", "version=1")
+    exec(compile(latest, "README.md", "exec"), names)
+    assert set(names["yaw"].dims) == {"speed_mps", "alpha_deg", "beta_deg", "depth_m"}
+    assert "drift_horizontal.csv row" in str(names["yaw"].sel(beta_deg=8).source.values)
 
 
 def test_the_plant_of_the_page_turns_to_its_heading(desk):

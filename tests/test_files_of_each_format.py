@@ -274,7 +274,7 @@ def test_runs_outside_a_stated_range_stay_in_the_table_and_are_not_used(tmp_path
     read(tmp_path / "b", PLAIN.rsplit("\n", 2)[0] + "\n", tidy("", MAP))
     without = identify(read_campaign(tmp_path / "b"))
     pd.testing.assert_frame_equal(database_rows(found), database_rows(without))
-    assert {(name, reason) for name, _, _, _, reason in found.unused} >= {("runs-4", "beta_deg beyond -4 to 4")}
+    assert {(one.run_id, one.reason) for one in found.unused} >= {("runs-4", "beta_deg beyond -4 to 4")}
 
 
 @pytest.mark.parametrize(

@@ -94,6 +94,7 @@ def test_depth_ratios_of_bb2_are_the_published_ones():
     table = pd.read_csv(PUBLISHED)
     mesh = read_geometry(BB2 / "geometry.toml", coarser=3.0)
     found = depth_table(mesh, -11.37, [2.5], [0.0, 0.66, np.inf], RHO, G)
+    assert len(found) == 3
     for _, row in found.iterrows():
         omega = table["omega"].astype(float)
         known = table[(table["D0_m"].astype(float) == 2.5) & (omega == row.omega_radps)].iloc[0]

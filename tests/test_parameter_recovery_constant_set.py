@@ -228,7 +228,7 @@ def test_constant_coefficient_set_has_no_axis_and_no_disagreement(constant_set):
     assert all(n.point == () for n in found.nodes)
     assert max(n.worst for n in found.nodes) < 1e-3
     # Loads of a rotating arm that no rate term adds to say nothing new; nothing else is left out.
-    assert {(file, output) for _, file, _, output, _ in found.unused} <= {("rotating_arm.csv", o) for o in OUTPUTS}
+    assert {(one.file, one.output) for one in found.unused} <= {("rotating_arm.csv", o) for o in OUTPUTS}
 
 
 def test_constant_coefficients_forbidden_by_symmetry_are_not_found(constant_set):

@@ -14,6 +14,7 @@ from ident.fitting.fit import given_of
 from ident.validation.draws import draw
 from sim.boat.coefficients import Coefficients
 from sim.boat.database import digest
+from sim.boat.delta_log import Version
 from sim.boat.forces import body_velocity
 from sim.boat.row_codec import correlation_matrix
 from sim.files.errors import InputError
@@ -106,16 +107,16 @@ def test_cross_flow_acts_only_where_drift_and_yaw_come_together(campaign, versio
 
 def test_a_version_without_an_estimate_or_a_term(campaign, rows, version, given):
     found, _ = version
-    metadata = {"given": json.dumps({"speed": given.speed, "pure_yaw": given.pure_yaw})}
-    less = without(campaign.vehicle, found, metadata, ["cross_flow", "X_vr"], "--without")
+    commit = Version(0, "", {"given": json.dumps({"speed": given.speed, "pure_yaw": given.pure_yaw})})
+    less = without(campaign.vehicle, found, commit, ["cross_flow", "X_vr"], "--without")
     assert not less["coefficient"].isin(["Y_cross", "N_cross", "X_vr"]).any()
     arm = less[less["coefficient"] == "N_ur"]
     measured = rows[rows["coefficient"] == "N_ur"]
     np.testing.assert_allclose(arm["value"], measured["value"], rtol=1e-9)
     with pytest.raises(InputError, match="estimate"):
-        without(campaign.vehicle, found, metadata, ["N_nothing"], "--without")
+        without(campaign.vehicle, found, commit, ["N_nothing"], "--without")
     with pytest.raises(InputError, match="runs alone"):
-        without(campaign.vehicle, rows, metadata, ["cross_flow"], "--without")
+        without(campaign.vehicle, rows, commit, ["cross_flow"], "--without")
 
 
 def test_the_reading_of_the_source_decides_the_damping_within_its_error(campaign, rows, given, version):

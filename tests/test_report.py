@@ -6,6 +6,7 @@ import html
 import json
 import math
 import re
+from dataclasses import astuple
 from pathlib import Path
 
 import pandas as pd
@@ -45,8 +46,8 @@ def database(found, tmp_path_factory):
         "frame": str(found.campaign.vehicle.frame.frame),
         "inputs": json.dumps(found.campaign.digests),
         "options": json.dumps({}),
-        "unused": json.dumps(found.unused),
-        "warnings": json.dumps(found.warnings),
+        "unused": json.dumps([astuple(one) for one in found.unused]),
+        "warnings": json.dumps([astuple(one) for one in found.warnings]),
         "quality": json.dumps({k: q.model_dump() for k, q in header.quality.items()}),
         "message": "",
     }
@@ -88,9 +89,9 @@ def test_page_states_origin(database, found, page):
         assert name in page
         assert digest in page
     text = html.unescape(page)
-    for _, name, _, _, reason in found.unused:
-        assert name in text
-        assert reason in text
+    for one in found.unused:
+        assert one.file in text
+        assert one.reason in text
     assert sum(int(n) for n in re.findall(r'<td class="num">(\d+)</td><td>\w+\.csv', page)) == len(found.unused)
 
 

@@ -61,7 +61,9 @@ def test_the_larger_campaigns_that_are_timed_have_every_run_so_often(tmp_path):
     campaign = Path(__file__).parents[1] / "raw_captive_data" / "bb2"
     times.larger(campaign, tmp_path, (3,))
     (arguments,) = (a for a in times.commands(campaign, tmp_path, (3,)).values() if a[1] == str(tmp_path / "x3"))
-    for path in campaign.glob("*.csv"):
+    files = sorted(campaign.glob("*.csv"))
+    assert len(files) > 10
+    for path in files:
         with path.open(encoding="utf-8") as own, (Path(arguments[1]) / path.name).open(encoding="utf-8") as made:
             assert len(list(csv.reader(made))) - 1 == 3 * (len(list(csv.reader(own))) - 1)
 

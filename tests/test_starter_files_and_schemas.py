@@ -62,7 +62,9 @@ def test_a_new_boat_is_checked_fitted_flown_and_trained_as_it_is_written(desk):
 
 
 def test_every_file_to_start_from_is_commented():
-    for path in (ROOT / "ident" / "starter" / "files").rglob("*.toml"):
+    started = sorted((ROOT / "ident" / "starter" / "files").rglob("*.toml"))
+    assert len(started) >= 5
+    for path in started:
         lines = path.read_text("utf-8").splitlines()
         assert lines[0].startswith("# ")
         assert sum("#" in line for line in lines) >= 3, path.name
@@ -151,7 +153,9 @@ def test_one_version_everywhere():
 
 def test_what_a_contributor_is_told_to_run_is_there():
     text = (ROOT / "CONTRIBUTING.md").read_text("utf-8")
-    for path in re.findall(r"`((?:sim|ident|tests|docs|\.ci)/[\w./]+\w)`", text):
+    named = re.findall(r"`((?:sim|ident|tests|docs|\.ci)/[\w./]+\w)`", text)
+    assert len(named) >= 10
+    for path in named:
         assert (ROOT / path).exists() or "NAME" in path, path
     for path in re.findall(r"(?:pytest (?:-n 0 )?|python )((?:tests|docs)/\S+\.py)", text):
         assert (ROOT / path).is_file(), path

@@ -11,6 +11,7 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from xml.etree import ElementTree
 
 import matplotlib as mpl
 import pandas as pd
@@ -106,8 +107,11 @@ def test_a_figure_draws_every_name(text):
         with warnings.catch_warnings():
             # A glyph that the font lacks is drawn as a box.
             warnings.simplefilter("ignore")
-            for kind in ("png", "svg"):
-                figure.savefig(io.BytesIO(), format=kind, dpi=30)
+            picture, drawing = io.BytesIO(), io.BytesIO()
+            figure.savefig(picture, format="png", dpi=30)
+            figure.savefig(drawing, format="svg")
+    assert picture.getvalue().startswith(b"\x89PNG")
+    assert ElementTree.fromstring(drawing.getvalue()).tag.endswith("svg")
 
 
 def test_a_figure_shows_dollars_as_dollars():

@@ -60,14 +60,14 @@ def captive_version(db: str, vehicle: str, number: int | None) -> Version:
     """
     if number is not None:
         captive = own_version(db, vehicle, number)
-        if json.loads(captive.metadata.get("trained", "[]")):
+        if captive.trained:
             raise InputError(
                 f"{db}, version {number}", "a calibrated version", "a captive-only one; see `ident versions`"
             )
         return captive
     for version in reversed(versions(db)):
         of_vehicle = version.metadata.get("vehicle", vehicle) == vehicle
-        if of_vehicle and not json.loads(version.metadata.get("trained", "[]")):
+        if of_vehicle and not version.trained:
             return version
     raise InputError(db, f"no captive version of {vehicle}", "a version written by `ident fit`")
 

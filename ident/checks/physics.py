@@ -154,9 +154,9 @@ def section_levers(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
     check_levers(solver)
     runs = evidence.runs
     rows = {name: k for k, name in reversed(list(enumerate(runs["run_id"])))} if solver.warnings else {}
-    for name, text in solver.warnings:
-        of_section = runs.iloc[rows[name]]
-        yield rule.finding(str(of_section["file"]), [of_section["row"]], ["x", "y", "z"], text)
+    for one in solver.warnings:
+        of_section = runs.iloc[rows[one.subject]]
+        yield rule.finding(str(of_section["file"]), [of_section["row"]], ["x", "y", "z"], one.message)
 
 
 @check("angle_name")

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Collection, Mapping
+from collections.abc import Collection
 from typing import TYPE_CHECKING
 
 from ident.estimates.draft import measured_rows
 from ident.estimates.predict import names, predicted
 from ident.estimates.turning import Given
+from sim.boat.delta_log import Version
 from sim.boat.vehicle import Vehicle
 from sim.files.errors import InputError
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def without(
-    vehicle: Vehicle, rows: pd.DataFrame, metadata: Mapping[str, str], left_out: Collection[str], where: str
+    vehicle: Vehicle, rows: pd.DataFrame, commit: Version, left_out: Collection[str], where: str
 ) -> pd.DataFrame:
     """Rows of a version with terms taken out, and with estimates undone.
 
@@ -26,7 +26,7 @@ def without(
     Parameters
     ----------
     vehicle, rows : Of the version.
-    metadata : Of its commit.
+    commit : That wrote it.
     left_out : Coefficients such as ``N_ur``, and estimates such as ``cross_flow``.
     where : The option, for messages.
 
@@ -42,11 +42,11 @@ def without(
         if name not in known:
             raise InputError(where, repr(name), f"a coefficient of the version, or an estimate: {', '.join(names())}")
     if estimates:
-        if json.loads(metadata.get("trained", "[]")):
+        if commit.trained:
             raise InputError(where, "an estimate of a calibrated version", "the version it was calibrated from")
         if rows["measured_value"].isna().all():
             raise InputError(where, "a version of the runs alone", "a version with estimates")
-        given = json.loads(metadata.get("given") or "{}")
+        given = commit.stored("given", {})
         yaw = given.get("pure_yaw")
         stored = Given(given.get("speed", {}), (yaw[0], yaw[1]) if yaw else None)
         rows, _ = predicted(vehicle, measured_rows(rows), stored, estimates)

@@ -156,20 +156,26 @@ def _parts(vehicle: Vehicle) -> tuple[pd.DataFrame, pd.DataFrame, Hull, pd.DataF
     return stern, forward, hull_of(folder / parts["hull"].offsets), pd.read_csv(folder / parts["sail"].offsets)
 
 
+def _by_plane(foils: pd.DataFrame, fixed: bool) -> dict[str, dict[str, float]]:
+    """Plane -> numbers of its moving foil, or of its fixed root."""
+    rows = foils[foils["fixed"] == int(fixed)].set_index("plane").drop(columns=["name", "fixed"])
+    return {str(plane): {str(c): float(x) for c, x in row.items()} for plane, row in rows.iterrows()}
+
+
 def _stern_fins(foils: pd.DataFrame, gap: float, radius: float) -> list[Fin]:
     """The stern fins with the gap between its leading- (0) and trailing-edge (1) place."""
-    roots = {root.plane: root for root in foils[foils["fixed"] == 1].itertuples()}
+    roots = _by_plane(foils, fixed=True)
     fins = []
-    for plane in foils[foils["fixed"] == 0].itertuples():
-        root = roots[plane.plane]
-        cut = plane.LE_root_s_m + gap * (plane.TE_root_s_m - plane.LE_root_s_m)
-        tip = 0.5 * (plane.LE_tip_s_m + plane.TE_tip_s_m)
+    for name, plane in _by_plane(foils, fixed=False).items():
+        root = roots[name]
+        cut = plane["LE_root_s_m"] + gap * (plane["TE_root_s_m"] - plane["LE_root_s_m"])
+        tip = 0.5 * (plane["LE_tip_s_m"] + plane["TE_tip_s_m"])
         chords = (
-            (radius, root.LE_root_x_m, root.TE_root_x_m),
-            (cut, root.LE_tip_x_m, root.TE_tip_x_m),
-            (tip, plane.LE_tip_x_m, plane.TE_tip_x_m),
+            (radius, root["LE_root_x_m"], root["TE_root_x_m"]),
+            (cut, root["LE_tip_x_m"], root["TE_tip_x_m"]),
+            (tip, plane["LE_tip_x_m"], plane["TE_tip_x_m"]),
         )
-        fins.append(Fin(chords, float(np.arctan2(plane.span_z, plane.span_y))))
+        fins.append(Fin(chords, float(np.arctan2(plane["span_z"], plane["span_y"]))))
     return fins
 
 
@@ -201,9 +207,11 @@ def carry_over(vehicle: Vehicle) -> CarryOver:
     foils, forward, hull, sail = _parts(vehicle)
     roots, moving = foils[foils["fixed"] == 1], foils[foils["fixed"] == 0]
     on_sail = _on_the_sail(forward, sail)
-    if on_sail.empty or moving.empty or not set(moving["plane"]) <= set(roots["plane"]):
+    names = [sorted(one["plane"]) for one in (moving, roots)]
+    if on_sail.empty or not names[0] or names[0] != names[1] or len(set(names[0])) < len(names[0]):
         where = f"vehicle {vehicle.name}, foils of its geometry"
-        raise InputError(where, "no planes on the sail, or none at the stern with fixed roots", "both")
+        seen = f"moving {names[0]}, fixed {names[1]} at the stern"
+        raise InputError(where, seen, "planes on the sail; at the stern one moving foil and one fixed root a plane")
     edges = np.array([roots["LE_root_x_m"].mean(), roots["TE_root_x_m"].mean()])
     radii = [float(np.ravel(hull.radius(edges[i : i + 1], np.array([np.pi / 4.0])))[0]) for i in (0, 1)]
     middle = float(np.mean(radii))

@@ -8,7 +8,7 @@ import math
 import os
 from collections import Counter
 from collections.abc import Collection
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, astuple, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -34,7 +34,6 @@ if TYPE_CHECKING:
     from rich.console import Console
 
 _log = logging.getLogger(__name__)
-_UNUSED = ("run_id", "file", "row", "output", "reason")
 
 
 @dataclass(frozen=True)
@@ -90,8 +89,8 @@ class Fit:
             "measured_only": not self.estimates,
             "estimates": [vars(e) for e in self.estimates],
             "coefficients": coefficient_table(self.rows),
-            "unused": [dict(zip(_UNUSED, u, strict=True)) for u in self.identification.unused],
-            "warnings": [{"subject": s, "message": m} for s, m in self.identification.warnings],
+            "unused": [one.to_dict() for one in self.identification.unused],
+            "warnings": [one.to_dict() for one in self.identification.warnings],
             "checks": [f.as_json() for f in self.findings],
             "between": [asdict(one) for one in self.identification.between],
         }
@@ -154,8 +153,8 @@ def metadata(
             "conversions": json.dumps(conversions(campaign)),
             "runs": json.dumps(run_sources(campaign)),
             "options": json.dumps({"uncertainty": header.uncertainty.model_dump()}),
-            "unused": json.dumps(identification.unused),
-            "warnings": json.dumps(identification.warnings),
+            "unused": json.dumps([astuple(one) for one in identification.unused]),
+            "warnings": json.dumps([astuple(one) for one in identification.warnings]),
             "quality": json.dumps({k: q.model_dump() for k, q in header.quality.items()}),
             "checks": json.dumps([f.as_json() for f in findings]),
             "estimates": json.dumps([vars(e) for e in estimates]),

@@ -5,7 +5,9 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass, field
-from typing import Any
+
+from ident.identification.noted import FitWarning, UnusedLoad
+from sim.boat.delta_log import Version
 
 _NUMBER = re.compile(r"(?<![\w.])[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?![\w.]*\w)")
 _BLANK = "\N{HORIZONTAL ELLIPSIS}"
@@ -57,27 +59,38 @@ class UnusedGroup:
         return sum(len(outputs) for outputs in self.runs.values())
 
 
-def group_warnings(warnings: Iterable[Any]) -> list[WarningGroup]:
-    """Warnings (subject, message) by their text, in order of appearance."""
+def stored_warnings(commit: Version) -> list[FitWarning]:
+    """The warnings that a commit carries."""
+    return [FitWarning(str(subject), str(message)) for subject, message in commit.stored("warnings", [])]
+
+
+def stored_unused(commit: Version) -> list[UnusedLoad]:
+    """The unused loads that a commit carries."""
+    every = commit.stored("unused", [])
+    return [UnusedLoad(str(run), str(file), row, str(load), str(why)) for run, file, row, load, why in every]
+
+
+def group_warnings(warnings: Iterable[FitWarning]) -> list[WarningGroup]:
+    """Warnings by their text, in order of appearance."""
     groups: dict[str, WarningGroup] = {}
-    for subject, message in warnings:
-        text = _NUMBER.sub(_BLANK, str(message))
-        numbers = [float(n) for n in _NUMBER.findall(str(message))]
+    for one in warnings:
+        text = _NUMBER.sub(_BLANK, one.message)
+        numbers = [float(n) for n in _NUMBER.findall(one.message)]
         group = groups.setdefault(text, WarningGroup(text))
         group.count += 1
         if numbers:
             group.lowest = min(numbers[0], group.lowest if group.lowest is not None else numbers[0])
             group.highest = max(numbers[0], group.highest if group.highest is not None else numbers[0])
-        group.subjects.append(str(subject))
+        group.subjects.append(one.subject)
     for group in groups.values():
         group.subjects = list(dict.fromkeys(group.subjects))
     return list(groups.values())
 
 
-def group_unused(unused: Iterable[Any]) -> list[UnusedGroup]:
-    """Unused loads (run_id, file, row, output, reason) by file and reason."""
+def group_unused(unused: Iterable[UnusedLoad]) -> list[UnusedGroup]:
+    """Unused loads by file and reason."""
     groups: dict[tuple[str, str], UnusedGroup] = {}
-    for run, file, _, output, reason in unused:
-        group = groups.setdefault((str(file), str(reason)), UnusedGroup(str(file), str(reason)))
-        group.runs.setdefault(str(run), []).append(str(output))
+    for one in unused:
+        group = groups.setdefault((one.file, one.reason), UnusedGroup(one.file, one.reason))
+        group.runs.setdefault(one.run_id, []).append(one.output)
     return list(groups.values())

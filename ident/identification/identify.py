@@ -27,6 +27,7 @@ from ident.cluster import Spread, here
 from ident.identification.equations import Runs
 from ident.identification.facilities import Between, Left, between, together, widened
 from ident.identification.nodes import Node, by_coefficient, table_points
+from ident.identification.noted import FitWarning, UnusedLoad
 from ident.identification.solver import Solver, check_levers
 from ident.identification.wake import wake_fraction
 from ident.output import Tell, silent
@@ -37,7 +38,7 @@ Array = NDArray[np.float64]
 _log = logging.getLogger(__name__)
 
 
-@dataclass
+@dataclass(frozen=True)
 class Identification:
     """Result of ``identify``.
 
@@ -47,8 +48,8 @@ class Identification:
     nodes : The tabulated values found, port/starboard folded onto one side.
     values : (n,) coefficients.
     covariance : (n, n) of ``values``.
-    unused : (run_id, file, row, output, reason) for every load that was not used.
-    warnings : (run_id or coefficient, message).
+    unused : Every load that was not used.
+    warnings : What is to be said of runs and coefficients that were.
     between : Error between facilities of each load, where several campaigns give it.
 
     Examples
@@ -64,8 +65,8 @@ class Identification:
     nodes: list[Node]
     values: Array
     covariance: Array
-    unused: list[tuple[str, str, int, str, str]]
-    warnings: list[tuple[str, str]]
+    unused: list[UnusedLoad]
+    warnings: list[FitWarning]
     between: tuple[Between, ...] = ()
 
     def __repr__(self) -> str:

@@ -18,6 +18,7 @@ from ident.cluster import Spread, here
 from ident.identification.equations import ALWAYS, BEYOND, NONZERO, Equations, Form, Note, Runs
 from ident.identification.facilities import Left
 from ident.identification.nodes import Node, by_coefficient, key_point, table_points
+from ident.identification.noted import FitWarning, UnusedLoad
 from ident.identification.stage_solve import solve_stage
 from sim.boat.catalogue import ACCELERATIONS, OUTPUTS, Term
 from sim.boat.forces import axis_values, boat_features, body_velocity, multiplier, plane_features
@@ -59,8 +60,8 @@ class Solver:
         self.tables: dict[Key, tuple[Table, list[int], list[int]]] = {}
         # What each stage leaves of its loads, kept where several campaigns are compared.
         self.left: list[Left] = []
-        self.unused: list[tuple[str, str, int, str, str]] = []
-        self.warnings: list[tuple[str, str]] = []
+        self.unused: list[UnusedLoad] = []
+        self.warnings: list[FitWarning] = []
         particulars, fluid = self.vehicle.particulars, campaign.header.fluid
         self.diameter = self.vehicle.diameter
         self.scales = {
@@ -141,7 +142,7 @@ class Solver:
 
     def skip(self, run: Run, output: str, reason: str) -> None:
         """Note that a load of a run is not used, and why."""
-        self.unused.append((run["run_id"], run["file"], int(run["row"]), output, reason))
+        self.unused.append(UnusedLoad(run["run_id"], run["file"], int(run["row"]), output, reason))
 
     def load_form(self, run: Run, output: str, features: dict[str, float]) -> tuple[Form, list[Note]]:
         """One load of a state: terms its test identifies are unknown, the others known."""
@@ -257,9 +258,9 @@ class Solver:
                 if note.when != ALWAYS and (value == 0.0 or (note.when == BEYOND and not abs(value) > 2.0 * sigma)):
                     continue
                 if note.unused:
-                    self.unused.append((names[row], files[row], int(places[row]), note.output, note.text))
+                    self.unused.append(UnusedLoad(names[row], files[row], int(places[row]), note.output, note.text))
                 else:
-                    self.warnings.append((names[row], note.text.replace("{value:g}", f"{value:g}")))
+                    self.warnings.append(FitWarning(names[row], note.text.replace("{value:g}", f"{value:g}")))
 
     # -- solution ------------------------------------------------------------------------
 
@@ -275,7 +276,7 @@ class Solver:
         for node in solution.lost:
             bad = self.nodes[first + node]
             text = f"{bad.part} at {bad.point}: the runs cannot tell it from other terms; dropped"
-            self.warnings.append((bad.name, text))
+            self.warnings.append(FitWarning(bad.name, text))
         self.covariance = np.block([[self.covariance, solution.cross.T], [solution.cross, solution.covariance]])
         self.values = np.concatenate([self.values, solution.values])
         if self.campaign.members:
@@ -310,7 +311,7 @@ class Solver:
             form = equations.forms[equations.form[i]]
             name = self.nodes[next(iter(form.unknowns))].name
             text = f"{name}: {form.output} disagrees with runs at the same point by {scores[i]:.1f} standard errors"
-            self.warnings.append((names[i], text))
+            self.warnings.append(FitWarning(names[i], text))
 
     def _forget(self, first: int, lost: list[int]) -> None:
         """Drop nodes that could not be identified."""
@@ -341,4 +342,4 @@ def check_levers(solver: Solver) -> None:
         off = (levers - section.position).abs().max(axis=1)
         for i in off.index[off > tolerance]:
             text = f"lever of {section.name} differs from the vehicle file's by {off[i]:.3g} m; the file's is used"
-            solver.warnings.append((str(runs.loc[i, "run_id"]), text))
+            solver.warnings.append(FitWarning(str(runs.loc[i, "run_id"]), text))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import json
 import re
 from collections.abc import Sequence
 from datetime import UTC, datetime
@@ -16,7 +15,7 @@ import pandas as pd
 from ident.analysis.derivatives import checks, derivatives
 from ident.checks.findings import SEVERITIES, spans
 from ident.database.provenance import steps
-from ident.fitting.notes import group_unused, group_warnings
+from ident.fitting.notes import group_unused, group_warnings, stored_unused, stored_warnings
 from ident.output import whole
 from ident.report.figures import draw_figures, equations, quality_colours
 from ident.report.interactive import Drawn, write_interactive
@@ -43,15 +42,6 @@ _UNIT = Environment(density=1.0, gravity=0.0)
 _MANY_RUNS = 40
 
 
-def _stored(metadata: dict[str, str], key: str, default: Any) -> Any:
-    """A JSON value of the commit, or ``default`` when it is missing or damaged."""
-    try:
-        stored = json.loads(metadata.get(key, ""))
-    except ValueError:
-        return default
-    return stored if isinstance(stored, type(default)) else default
-
-
 def _time(stamp: str) -> str:
     return datetime.fromtimestamp(int(stamp) / 1000, UTC).strftime("%Y-%m-%d %H:%M UTC") if stamp.isdigit() else stamp
 
@@ -65,7 +55,7 @@ def _option(key: str, value: Any) -> str:
 
 def _provenance(db: str, number: int, commit: Version, vehicle: Vehicle) -> list[tuple[str, str]]:
     known = commit.metadata
-    options = [_option(key, value) for key, value in _stored(known, "options", {}).items()]
+    options = [_option(key, value) for key, value in commit.stored("options", {}).items()]
     return [
         ("Database", db),
         ("Version", str(number)),
@@ -167,9 +157,9 @@ def _signs(coefficients: Coefficients, rows: pd.DataFrame) -> dict[str, Any]:
     return {"speed": speed, "depth": depth, "rows": signs, "passed": sum(d.ok for d in signs), "sources": sources}
 
 
-def _vocabulary(metadata: dict[str, str], rows: pd.DataFrame) -> list[dict[str, Any]]:
+def _vocabulary(commit: Version, rows: pd.DataFrame) -> list[dict[str, Any]]:
     """Quality words by rising factor, with the number of points behind each."""
-    known = _stored(metadata, "quality", {})
+    known = commit.stored("quality", {})
     counts = rows["quality"].value_counts()
     words = sorted({*known, *(q for q in counts.index if q)}, key=lambda w: known.get(w, {}).get("factor", 1.0))
     words.sort(key=lambda w: (known.get(w, {}).get("factor", 1.0), list(known).index(w) if w in known else 0))
@@ -189,7 +179,7 @@ def _calibration(commit: Version, vehicle: Vehicle, number: int) -> dict[str, An
     from ident.calibration.figure import prior_and_posterior
     from ident.calibration.result import MultiplierGroup
 
-    stored = _stored(commit.metadata, "calibration", {})
+    stored = commit.stored("calibration", {})
     if not stored:
         return None
     stamp = f"{vehicle.name}, database version {number}; program frame: {PROGRAM}"
@@ -226,7 +216,7 @@ def _content(
     """Everything the template shows."""
     from markupsafe import Markup
 
-    vocabulary = _vocabulary(commit.metadata, rows)
+    vocabulary = _vocabulary(commit, rows)
     colours = quality_colours(q["word"] for q in vocabulary)
     coverage = _coverage(vehicle, rows, {q["word"]: q["factor"] or 1.0 for q in vocabulary})
     columns = {a: c for c, a in axis_columns().items()}
@@ -244,8 +234,8 @@ def _content(
         "version": number,
         "frame": str(PROGRAM),
         "provenance": [(k, v) for k, v in _provenance(db, number, commit, vehicle) if v],
-        "steps": steps(_stored(commit.metadata, "conversions", {})),
-        "inputs": _stored(commit.metadata, "inputs", {}),
+        "steps": steps(commit.stored("conversions", {})),
+        "inputs": commit.stored("inputs", {}),
         "coverage": {g: [c for c in coverage if c["group"] == g] for g in dict.fromkeys(c["group"] for c in coverage)},
         "present": [c for c in coverage if not c["absent"]],
         "absent": [c for c in coverage if c["absent"]],
@@ -254,10 +244,10 @@ def _content(
         "points": len(rows),
         "pictures": pictures,
         "signs": _signs(Coefficients(vehicle, rows), rows),
-        "warnings": group_warnings(_stored(commit.metadata, "warnings", [])),
-        "unused": group_unused(_stored(commit.metadata, "unused", [])),
-        "checks": _stored(commit.metadata, "checks", []) if "checks" in commit.metadata else None,
-        "severities": _severities(_stored(commit.metadata, "checks", []) if "checks" in commit.metadata else None),
+        "warnings": group_warnings(stored_warnings(commit)),
+        "unused": group_unused(stored_unused(commit)),
+        "checks": commit.stored("checks", []) if "checks" in commit.metadata else None,
+        "severities": _severities(commit.stored("checks", []) if "checks" in commit.metadata else None),
         "calibration": _calibration(commit, vehicle, number),
         "vocabulary": vocabulary,
         "colours": colours,
@@ -375,6 +365,6 @@ def _counts(content: dict[str, Any], rows: int, commit: Version) -> dict[str, An
         "absent": [row["symbol"] for row in content["absent"]],
         "signs": {"expected": content["signs"]["passed"], "of": len(content["signs"]["rows"])},
         "findings": _severities(content["checks"]),
-        "warnings": len(_stored(commit.metadata, "warnings", [])),
-        "unused": len(_stored(commit.metadata, "unused", [])),
+        "warnings": len(commit.stored("warnings", [])),
+        "unused": len(commit.stored("unused", [])),
     }

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -11,6 +10,7 @@ from typing import Any
 
 import pandas as pd
 
+from ident.fitting.notes import stored_unused
 from ident.report.figures import Picture, equations
 from sim.boat import catalogue
 from sim.boat.catalogue import Term
@@ -121,13 +121,6 @@ def number(x: float, digits: int = 5) -> str:
     return f"{x + 0.0:.{digits}g}".replace("-", "\N{MINUS SIGN}")
 
 
-def _stored(commit: Version, key: str) -> Any:
-    try:
-        return json.loads(commit.metadata.get(key, "") or "{}")
-    except ValueError:
-        return {}
-
-
 def runs_of(rows: pd.DataFrame, commit: Version) -> dict[str, Run]:
     """Every run that a version used or left out, by name.
 
@@ -141,9 +134,9 @@ def runs_of(rows: pd.DataFrame, commit: Version) -> dict[str, Run]:
         for name in text.split():
             terms.setdefault(name, {})[symbol] = None
     unused: dict[str, dict[str, list[str]]] = {}
-    for name, _, _, output, reason in _stored(commit, "unused") or []:
-        unused.setdefault(name, {}).setdefault(reason, []).append(output)
-    stored = _stored(commit, "runs") or {"files": [], "sources": [], "runs": {}}
+    for one in stored_unused(commit):
+        unused.setdefault(one.run_id, {}).setdefault(one.reason, []).append(one.output)
+    stored = commit.stored("runs", {}) or {"files": [], "sources": [], "runs": {}}
     made: dict[str, Run] = {}
     for name in dict.fromkeys([*stored["runs"], *terms, *unused]):
         file, row, source = stored["runs"].get(name, (-1, 0, -1))

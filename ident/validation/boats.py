@@ -154,6 +154,6 @@ class Fleet:
                 if self.left_out and number == self.number:
                     from ident.estimates.ablation import without
 
-                    rows = without(vehicle, rows, commit.metadata, self.left_out, "--without")
+                    rows = without(vehicle, rows, commit, self.left_out, "--without")
                 self._boats[key] = Boat(vehicle, rows, commit, Coefficients(vehicle, rows))
             return self._boats[key]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Collection, Iterable
 from concurrent.futures import ThreadPoolExecutor
@@ -52,7 +51,7 @@ def _flyable(names: list[str], present: set[str]) -> list[str]:
 
 def trained_on(boat: Boat) -> list[str]:
     """What a vehicle's coefficients were trained on: names of cases, or case:source."""
-    return list(json.loads(boat.commit.metadata.get("trained", "[]")))
+    return boat.commit.trained
 
 
 def is_trained(case: str, trained: list[str]) -> bool:

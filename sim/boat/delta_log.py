@@ -69,6 +69,19 @@ class Version:
         """Content digest of the rows of the commit's vehicle; empty when it wrote none."""
         return self.metadata.get("digest", "")
 
+    @property
+    def trained(self) -> list[str]:
+        """Cases that a calibrated version was trained on; none for one that no maneuver made."""
+        return list(json.loads(self.metadata.get("trained", "[]")))
+
+    def stored(self, key: str, default: Any) -> Any:
+        """A JSON value of the commit, or ``default`` where it is missing, damaged or of another type."""
+        try:
+            value = json.loads(self.metadata.get(key, ""))
+        except ValueError:
+            return default
+        return value if isinstance(value, type(default)) else default
+
 
 def seal(metadata: Mapping[str, str]) -> str:
     """SHA-256 of what a commit says of itself."""
