@@ -12,7 +12,10 @@ if "PYTEST_XDIST_WORKER" in os.environ:
 
 import numpy as np
 import pytest
+from damaged_databases import commits, times
+from deltalake import DeltaTable
 from hypothesis import settings
+from small_campaign import fitted, write
 
 from ident.captive.campaign import read_campaign
 from ident.database.store import commit, database_rows
@@ -134,3 +137,29 @@ def pytest_runtest_makereport(item, call):
             report.outcome = "failed"
             report.longrepr = f"{item.nodeid}: left out without a reason listed in tests/conftest.py: {reason}"
     return report
+
+
+@pytest.fixture(scope="session")
+def few_rows(tmp_path_factory):
+    """Rows of a small campaign, for what is about databases and not about their content."""
+    return fitted(write(tmp_path_factory.mktemp("small") / "campaign"))
+
+
+@pytest.fixture(scope="session")
+def three_versions(few_rows, tmp_path_factory):
+    """A database of three versions of two vehicles."""
+    path = tmp_path_factory.mktemp("three") / "db"
+    commit(str(path), few_rows, {"message": "first", "campaign": "small"})
+    commit(str(path), few_rows.assign(vehicle="suboff", value=few_rows["value"] * 3), {"message": "\u00b0"})
+    commit(str(path), few_rows.assign(value=few_rows["value"] * 2), {"message": "third", "trained": "[]"})
+    return path
+
+
+@pytest.fixture(scope="session")
+def checkpointed(few_rows, tmp_path_factory):
+    """Twelve versions and a checkpoint, which the storage engine writes of itself every hundred versions."""
+    path = tmp_path_factory.mktemp("checkpointed") / "db"
+    commits(str(path), few_rows, 11)
+    DeltaTable(path).create_checkpoint()
+    commit(str(path), times(few_rows, 5.0), {})
+    return path

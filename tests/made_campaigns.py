@@ -84,3 +84,15 @@ def assert_means(runs) -> None:
     np.testing.assert_allclose(runs[COLUMNS].to_numpy()[0], MEANS, rtol=1e-6)
     np.testing.assert_allclose(runs[["s_X", "s_Y", "s_N"]].to_numpy()[0], 1.0 / np.sqrt(400), rtol=0.3)
     assert runs["beta"].iloc[0] == pytest.approx(np.radians(5.0))
+
+
+def runs_of(folder, name: str, keys: str = ""):
+    """Runs of a file, a row a run."""
+    campaign(folder, tidy(keys).replace("runs.*", name))
+    return read_campaign(folder).runs
+
+
+def reduced(folder, name: str, keys: str = ""):
+    """The run that a file of a time history reduces to."""
+    campaign(folder, history(name, keys))
+    return read_campaign(folder).runs

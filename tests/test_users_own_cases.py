@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 from importlib.resources import files
+from pathlib import Path
 
 import pytest
 
+from ident.schemas.describe import KINDS as FILES
+from ident.starter.write import write_starter
+from ident.validation.case_folder import KINDS, in_folder
 from ident.validation.validate import validate
 from sim.boat.vehicle import load_vehicle
 from sim.files.errors import InputError
 from sim.flight.case import load_case
+from sim.hull.surface import Geometry
 
 TEXT = (files("sim") / "cases" / "roll-decay.toml").read_text("utf-8")
 SERIES = (files("sim") / "cases" / "data" / "roll_decay.csv").read_text("utf-8")
@@ -135,3 +140,27 @@ def test_mistake_in_a_vehicle_is_named(tmp_path, old, new, words):
         load_vehicle(path)
     for word in words:
         assert word in str(caught.value)
+
+
+def test_what_tells_the_kind_of_a_file_is_in_every_file_of_it_and_in_no_other():
+    models = {**{kind: model for kind, model in FILES.items() if kind in KINDS or kind == "case"}, "geometry": Geometry}
+    assert set(models) == {*KINDS, "case"}
+    for kind, keys in KINDS.items():
+        assert all(models[kind].model_fields[key].is_required() for key in keys), kind
+        assert not any(set(keys) & set(model.model_fields) for other, model in models.items() if other != kind), kind
+
+
+def test_the_folder_that_a_starter_fills_is_a_folder_of_cases(tmp_path):
+    folder = write_starter(tmp_path / "boat")[0].parent
+    cases, others = in_folder(folder)
+    assert cases == [str(folder / "zigzag.toml")]
+    assert {Path(name).name: kind for name, kind in others.items()} == {
+        "calibration.toml": "calibration",
+        "my-boat.toml": "vehicle",
+    }
+    (folder / "slip.toml").write_text((folder / "zigzag.toml").read_text("utf-8").replace("[command", "[commnad"))
+    slipped = next(name for name in in_folder(folder)[0] if name.endswith("slip.toml"))
+    with pytest.raises(InputError, match="commnad"):
+        load_case(slipped)
+    with pytest.raises(InputError, match=r"no case file beside campaign.toml \(a campaign\)"):
+        in_folder(folder / "captive")

@@ -98,7 +98,10 @@ class CalibrateOptions:
 @click.option("--case", "case", default=None, help="Bundled case name, or path to a case file.")
 @click.option("--all", "every", is_flag=True, help="Fly every bundled case and print the scoreboard.")
 @click.option(
-    "--cases", type=click.Path(path_type=Path), default=None, help="With --all: a folder of your own cases too."
+    "--cases",
+    type=click.Path(path_type=Path),
+    default=None,
+    help="With --all: a folder of your own cases too.",
 )
 @DB
 @VERSION
@@ -272,6 +275,8 @@ def _all(asked: ValidateOptions, console: Any) -> Scoreboard:
             tell=lambda name, place, of: status.update(f"flying {on_screen(name)}, {place + 1} of {of}"),
         )
     show(board, console)
+    for name, kind in board.passed_over.items():
+        console.print(f"passed over, a {kind}: {on_screen(name)}", highlight=False, markup=False)
     return board
 
 

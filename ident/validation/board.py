@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -174,18 +174,22 @@ class Scoreboard:
     database : Path, version and digest.
     cases : In the order they were asked for.
     trained_on : Vehicle -> what its coefficients were trained on: names of cases, or case:source.
+    passed_over : Files of the folder of cases that are none -> what they are.
 
     Examples
     --------
     >>> import ident
-    >>> board = ident.scoreboard(db="coeff_db", cases=["my-boat/zigzag.toml"])
+    >>> board = ident.scoreboard(db="coeff_db", cases="my-boat")
     >>> [case.name for case in board.cases], board.table["rmse"].gt(0.0).all().item()
     (['my-zigzag'], True)
+    >>> list(board.passed_over.values())
+    ['calibration', 'vehicle']
     """
 
     database: dict[str, Any]
     cases: tuple[BoardCase, ...]
     trained_on: dict[str, list[str]]
+    passed_over: dict[str, str] = field(default_factory=dict)
 
     @property
     def flown(self) -> list[Validation]:
@@ -286,6 +290,8 @@ class Scoreboard:
             "trained_on": self.trained_on,
             "worst_ratio": asdict(worst) if worst else None,
         }
+        if self.passed_over:
+            plain["passed_over"] = self.passed_over
         if any(one.bands for one in self.flown):
             plain |= {"coverage": self.coverage, "reliability": [asdict(point) for point in self.reliability]}
         return plain

@@ -10,6 +10,7 @@ from pathlib import Path
 from ident.output import Tell, silent
 from ident.validation.board import BoardCase, ComparedError, Parent, Scoreboard
 from ident.validation.boats import Boat, Fleet
+from ident.validation.case_folder import in_folder
 from ident.validation.result import ChannelError, Validation
 from ident.validation.validate import errors, flights, validated
 from sim.boat.catalogue import CatalogueError
@@ -33,11 +34,12 @@ def case_names(cases: str | os.PathLike[str] | Iterable[str | os.PathLike[str]] 
         return names
     if not isinstance(cases, str | os.PathLike):
         return names + [os.fspath(one) for one in cases]
-    folder = Path(cases)
-    beside = sorted(str(p) for p in folder.glob("*.toml")) if folder.is_dir() else []
-    if not beside:
-        raise InputError(str(folder), "no case file", "a folder with case files (*.toml)")
-    return names + beside
+    return names + in_folder(Path(cases))[0]
+
+
+def _passed_over(cases: str | os.PathLike[str] | Iterable[str | os.PathLike[str]] | None) -> dict[str, str]:
+    """Files of a folder of cases that are none, and what they are."""
+    return in_folder(Path(cases))[1] if isinstance(cases, str | os.PathLike) else {}
 
 
 def _flyable(names: list[str], present: set[str]) -> list[str]:
@@ -126,7 +128,8 @@ def scoreboard(
     Parameters
     ----------
     db, version : Folder or URL of the database, and version, latest when None.
-    cases : Folder of users' own cases beside the bundled ones, or their files.
+    cases : Folder of users' own cases beside the bundled ones, or their files. Vehicle, campaign, calibration and
+        geometry files of the folder are passed over by name.
     without : Terms and estimates that the version is flown without.
     workers : Threads; all cores when None. The result does not depend on it.
     tell : Called with the name of each case before it is flown, its place and how many there are.
@@ -161,4 +164,5 @@ def scoreboard(
         database={"path": fleet.db, "version": fleet.number, "digest": fleet.record.digest},
         cases=flown,
         trained_on={name: trained_on(boat) for name, boat in boats.items()},
+        passed_over=_passed_over(cases),
     )
