@@ -39,7 +39,7 @@ position = [-1.4, 0.0, 0.0]
 span_axis = [0.0, 0.0, 1.0]
 leading_edge = [1.0, 0.0, 0.0]
 mirror = "rudders"
-mixer = { dV = 0.0, dH = 1.0 }
+mixer = { dV = 0.0, dH = -1.0 }
 limit_deg = 30.0
 rate_degps = 5.0
 source = "made"

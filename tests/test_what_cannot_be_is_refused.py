@@ -68,6 +68,23 @@ def test_every_bundled_vehicle_can_be(name):
         ("rate_degps = 7.11", "rate_degps = 7.11e9", "stern_plane_1, rate_degps"),
         ("limit_deg = 30.0", "limit_deg = 3000.0", "stern_plane_1, limit_deg"),
         ('name = "Hull 2"', 'name = "Hull 1"', "planes and sections"),
+        ('name = "Hull 2"', 'name = " "', "sections.centres.1.name"),
+        ('name = "MARIN 7371R"', 'name = ""', "propeller.name"),
+        ("[0.0, 0.0, 0.0443]", "[0.0, 0.0, 4.43]", "centre_of_gravity"),
+        ("[0.0, 0.0, 0.0443]", "[4.43, 0.0, 0.0443]", "centre_of_gravity"),
+        ("[0.0, 0.0, 0.0443]", "[0.0, 0.5, 0.0443]", "centre_of_gravity"),
+        ("span_axis = [0, 1, -1]", "span_axis = [0, 1, 1]", "stern_plane_1, span_axis"),
+        ("leading_edge = [-1, 0, 0]", "leading_edge = [1, 0, 0]", "stern_plane_1, leading_edge"),
+        ("dV = -1, dH = -1", "dV = 1, dH = -1", "stern_plane_1, mixer.dV"),
+        ("dV = -1, dH = -1", "dV = -1, dH = 1", "stern_plane_1, mixer.dH"),
+        ("limit_deg = 30.0", "limit_deg = 3.0", "stern_plane_1, limit_deg"),
+        ("rate_degps = 7.11", "rate_degps = 0.00711", "stern_plane_1, rate_degps"),
+        ("leading_edge = [-1, 0, 0]", "leading_edge = [0, 1, 1]", "stern_plane_1, leading_edge"),
+        ("value = 70.2,", "value = 702.0,", "particulars.length"),
+        ("[3.433, 17.6, 17.522]", "[17.6, 3.433, 17.522]", "radius_of_gyration"),
+        ("[0.0, 0.0, 11.37]", "[0.0, 11.37, 0.0]", "sail_top"),
+        ("[0.0, 0.0, 0.4741]", "[0.0, 0.4741, 0.0]", "centre_of_buoyancy"),
+        ("[-27.2503, 0.0, 0.0081]", "[0.0081, -27.2503, 0.0]", "sections, Hull 1"),
     ],
 )
 def test_a_vehicle_that_no_body_is_like_is_refused(tmp_path, old, new, key):
@@ -122,21 +139,45 @@ def test_a_share_of_thrust_or_speed_that_no_hull_takes_is_not_flown(rows, coeffi
         assemble(Coefficients(load_vehicle("bb2"), wrong), WATER)
 
 
+@pytest.mark.parametrize(
+    ("old", "new", "key"),
+    [("mixer = { dV = -1, dH = 0 }", "mixer = { dV = 1, dH = 0 }", "mixer.dV"),
+     ("mixer = { dV = 0, dH = -1 }", "mixer = { dV = 0, dH = 1 }", "mixer.dH"),
+     ("mixer = { dV = 0, dH = -1 }", "mixer = { dV = 0.5, dH = -1 }", "rudders, mixer.dV"),
+     ("[0.0, 0.0, 0.25]", "[0.25, 0.0, 0.0]", "a trim of 90 deg"),
+     ("[0.0, 0.0, 0.25]", "[0.0, 0.0, -0.25]", "above the centre of buoyancy")],
+)  # fmt: skip
+def test_a_boat_does_what_it_is_told_and_lies_upright(tmp_path, old, new, key):
+    """What dV and dH do is their definition (docs/conventions.md); statics of a submerged body is Archimedes'."""
+    text = (files("ident") / "starter" / "files" / "my-boat.toml").read_text("utf-8")
+    assert old in text
+    (tmp_path / "boat.toml").write_text(text.replace(old, new, 1))
+    with pytest.raises(InputError) as caught:
+        load_vehicle(tmp_path / "boat.toml")
+    assert key in str(caught.value)
+
+
+def test_a_boat_whose_heel_and_trim_are_held_may_be_heavy_above(tmp_path):
+    """A ship in surge, sway and yaw: the waterplane holds her up, of which the file says nothing."""
+    edit = ("centre_of_gravity = { value = [0.25, 0.0, 0.0]", "centre_of_gravity = { value = [0.25, 0.0, -0.1]")
+    assert load_vehicle(written(tmp_path, "vehicles", "kvlcc2-mmg", edit)).name == "kvlcc2-mmg"
+
+
 @pytest.mark.parametrize("key", ["geometry", "errata"])
 def test_a_file_that_a_vehicle_names_is_there_or_refused(tmp_path, monkeypatch, key):
-    """Beside the vehicle's file, bundled, or where a variable of the environment says."""
+    """Beside the vehicle's file or bundled, by its name as it is written."""
     name = "bb2/geometry.toml" if key == "geometry" else "bb2/errata.csv"
     ours = getattr(load_vehicle("bb2"), key)
     assert getattr(load_vehicle(written(tmp_path, "vehicles", "bb2")), key) == ours
-    for absent in ("bb2/none.toml", "", "bb2", "a" * 300, "$NOWHERE/x.toml"):
-        with pytest.raises(InputError, match=f"key {key}: no file"):
-            load_vehicle(written(tmp_path, "vehicles", "bb2", (name, absent)))
     (tmp_path / "hulls").mkdir()
     (tmp_path / "hulls" / "own.toml").write_text("")
     monkeypatch.setenv("HULLS", str(tmp_path / "hulls"))
-    for present in ("hulls/own.toml", "$HULLS/own.toml"):
-        vehicle = load_vehicle(written(tmp_path, "vehicles", "bb2", (name, present)))
-        assert getattr(vehicle, key) == str(tmp_path / "hulls" / "own.toml")
+    for absent in ("bb2/none.toml", "", "bb2", "a" * 300, "$HULLS/own.toml"):
+        with pytest.raises(InputError, match=f"key {key}: no file") as caught:
+            load_vehicle(written(tmp_path, "vehicles", "bb2", (name, absent)))
+        assert ("no variable of the environment" in str(caught.value)) == absent.startswith("$")
+    vehicle = load_vehicle(written(tmp_path, "vehicles", "bb2", (name, "hulls/own.toml")))
+    assert getattr(vehicle, key) == str(tmp_path / "hulls" / "own.toml")
 
 
 @pytest.mark.parametrize("limits", [[0.01, 0.02], [-5.0, -1.0]])

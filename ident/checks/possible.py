@@ -14,8 +14,7 @@ import pandas as pd
 from ident.captive.campaign import Campaign
 from ident.captive.run_table import MEASURED
 from ident.checks.findings import Evidence, Finding, Rule, check, kept, rows_of, together
-from sim.boat.catalogue import ACCELERATIONS
-from sim.boat.plausible import FRACTIONS
+from sim.boat.catalogue import ACCELERATIONS, SETS, terms
 
 # Files that hold runs when a campaign's source names them.
 _TABLES = frozenset((".csv", ".parquet", ".xlsx", ".xls", ".xlsb", ".ods", ".mat", ".h5", ".nc", ".tdms", ".lvm"))
@@ -45,7 +44,8 @@ def states_of_a_boat(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
     yield from _beyond(runs, rule, "D0", runs["D0"], limits["depth"], "m of depth")
     yield from _beyond(runs, rule, "t", runs["t"].abs(), limits["fraction"], "of the thrust")
     if "coefficient" in runs and "value" in runs:
-        of_hull = runs[runs["coefficient"].isin(list(FRACTIONS))]
+        sets = (vehicle.term_set,) if vehicle is not None else SETS
+        of_hull = runs[runs["coefficient"].isin([t.name for s in sets for t in terms(s) if t.share_of])]
         yield from _beyond(of_hull, rule, "value", of_hull["value"].abs(), limits["fraction"], "of thrust or speed")
 
 

@@ -47,6 +47,8 @@ BOAT_FEATURES = (
 # Rates below this [rad/s] have no pivot v/r or w/q: what depends on it has vanished with the rate.
 STILL = 1e-9
 PLANE_FEATURES = ("V", "delta", "deflection")
+# What a value that is no load may be a part of.
+SHARES = ("", "thrust", "speed")
 ACCELERATIONS = ("udot", "vdot", "wdot", "pdot", "qdot", "rdot")
 
 
@@ -128,6 +130,7 @@ class Term:
     extrapolation : Axis name -> rule beyond the tabulated range, one of ``RULES``.
     tests : Captive tests that identify the coefficient.
     equation : Equation numbers of Kim (2021) (errata applied).
+    share_of : What the value is a part of, ``thrust`` or ``speed``, so that its size is below 1; else empty.
     note : Free text.
     """
 
@@ -145,6 +148,7 @@ class Term:
     extrapolation: dict[str, str]
     tests: tuple[str, ...]
     equation: str
+    share_of: str
     note: str
 
     @property
@@ -217,6 +221,7 @@ def _term(row: dict[str, str]) -> Term:
         extrapolation=_pairs(row["extrapolation"]),
         tests=tuple(row["test"].split()),
         equation=row["equation"],
+        share_of=row["share_of"],
         note=row["note"],
     )
 
@@ -237,6 +242,8 @@ def check(term: Term) -> None:
     problems += [f"rule {r!r}" for r in term.extrapolation.values() if r not in RULES]
     if set(term.extrapolation) != set(term.axes):
         problems.append("an extrapolation rule for each axis and no other")
+    if term.share_of not in SHARES or (term.share_of and term.output):
+        problems.append(f"share of {term.share_of!r}, one of {', '.join(SHARES[1:])} of a row that is no load")
     # The angle of a plane is mirrored to that of its image, ``sim.boat.parts``.
     if "delta" not in term.axes:
         turned = {a: term.mirror_sign() for a in term.axes if a in axes() and axes()[a].mirror < 0}
@@ -287,6 +294,7 @@ _OWN_DEFAULTS = {
     "parity": "",
     "extrapolation": "",
     "equation": "",
+    "share_of": "",
     "note": "",
 }
 

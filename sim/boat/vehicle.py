@@ -55,7 +55,7 @@ class Propeller(Data):
     position : Of the propeller disc from the body origin [m]; waves need it.
     """
 
-    name: str
+    name: Name
     diameter: Length
     limits: Annotated[Limits, in_unit("rps")]
     rate: Annotated[Number, in_unit("rps/s", positive=True)]
@@ -105,7 +105,7 @@ class Plane(Data):
     source : Where this comes from.
     """
 
-    name: str
+    name: Name
     where: str
     position: Vector
     span_axis: Vector
@@ -137,7 +137,7 @@ class Section(Data):
     position : Of its centre from the body origin [m].
     """
 
-    name: str
+    name: Name
     position: Vector
 
 
@@ -216,8 +216,7 @@ class Vehicle(Data):
     ``geometry`` names its surface (``sim.hull.surface``), waves need it; ``errata`` a table of what is
     printed wrong in its source and how it is applied (columns equation, printed, corrected,
     consequence), shown in the report. They and ``terms`` are relative to the vehicle file, or one that is
-    bundled (``bb2/geometry.toml``), so that a copy of a bundled vehicle is whole; environment variables in them
-    are replaced.
+    bundled (``bb2/geometry.toml``), so that a copy of a bundled vehicle is whole.
 
     Attributes
     ----------
@@ -373,7 +372,10 @@ def _file_of(where: str, key: str, name: str) -> str:
     """Path of a file that a vehicle file names: beside it, else bundled."""
     ours = str(files("sim") / "vehicles")
     for place in (ours if where in bundled("vehicles") else os.path.dirname(where), ours):
-        path = os.path.join(place, os.path.expandvars(name))
+        path = os.path.join(place, name)
         if os.path.isfile(path):
             return path
-    raise InputError(f"{where}, key {key}", f"no file {name[:200]!r}", "a file beside it, or a bundled one")
+    allowed = "a file beside it, or a bundled one"
+    if "$" in name or "%" in name or name.startswith("~"):
+        allowed += "; its name as it is, no variable of the environment is put in"
+    raise InputError(f"{where}, key {key}", f"no file {name[:200]!r}", allowed)

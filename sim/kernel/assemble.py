@@ -262,7 +262,7 @@ def assemble(coefficients: Coefficients, environment: Environment) -> Model:
     added = added_mass_matrix(coefficients, environment)
     total = mass + added
     check_mass(total, added, vehicle)
-    check_shares({c.term.name: c.values for c in coefficients if not c.term.output}, vehicle)
+    check_shares(((c.term, c.values) for c in coefficients), vehicle)
     still = [OUTPUTS.index(o) for o in held(vehicle.term_set)]
     numbers = {
         "mass": particulars.mass.value,
