@@ -132,6 +132,8 @@ def errors(
 
 
 def _passed(case: Case, by_source: dict[str, dict[str, ChannelError]]) -> bool:
+    """Whether every tolerance holds; each is looked at, also after one that does not."""
+    held = True
     for tolerance in case.tolerance:
         entry = by_source.get(tolerance.source, {}).get(tolerance.channel)
         if entry is None or entry.unit != tolerance.unit:
@@ -140,9 +142,8 @@ def _passed(case: Case, by_source: dict[str, dict[str, ChannelError]]) -> bool:
                 "no such reference channel in that unit",
                 "a source, channel and unit of the reference file",
             )
-        if not entry.rmse <= tolerance.rmse:
-            return False
-    return True
+        held = held and entry.rmse <= tolerance.rmse
+    return held
 
 
 def _with_reference(case: Case, record: OwnReference) -> Referenced:

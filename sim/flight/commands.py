@@ -18,6 +18,12 @@ _WATCHED = (*STATES, "U", "point_depth")
 _LAWS = {"fixed": orders.FIXED, "pid": orders.PID, "zigzag": orders.ZIGZAG, "programme": orders.PROGRAMME}
 
 
+# Of a command [deg]: planes turn no farther either way.
+Angle = Annotated[float, Field(ge=-90.0, le=90.0)]
+# Gains steer back where they are positive; negative ones would drive away.
+Gain = Annotated[float, Field(ge=0.0)]
+
+
 class Event(Data):
     """What ends a step or the run: a time, or a channel that reaches something.
 
@@ -96,8 +102,8 @@ class PlaneStep(Data):
     until : Events that end the step; the first counts.
     """
 
-    value_deg: float | None = None
-    from_trim_deg: float | None = None
+    value_deg: Angle | None = None
+    from_trim_deg: Angle | None = None
     hold: bool = False
     distance_m: float = 0.0
     angle_deg: float = 0.0
@@ -145,26 +151,26 @@ class PlaneCommand(Data):
     """
 
     law: Literal["fixed", "pid", "zigzag", "programme"]
-    value_deg: float = 0.0
-    first_deg: float = 0.0
-    check_deg: float = 0.0
-    limit_deg: Positive = 30.0
+    value_deg: Angle = 0.0
+    first_deg: Angle = 0.0
+    check_deg: Annotated[float, Field(ge=0.0, lt=180.0)] = 0.0
+    limit_deg: Annotated[float, Field(gt=0.0, le=90.0)] = 30.0
     depth_from: Literal["calm_surface", "pressure"] = "calm_surface"
-    P_z: float = 0.0
-    I_z: float = 0.0
-    D_z: float = 0.0
-    P_theta: float = 0.0
-    I_theta: float = 0.0
-    D_theta: float = 0.0
-    P_y: float = 0.0
-    I_y: float = 0.0
-    D_y: float = 0.0
-    P_psi: float = 0.0
-    I_psi: float = 0.0
-    D_psi: float = 0.0
-    P_r: float = 0.0
-    I_r: float = 0.0
-    D_r: float = 0.0
+    P_z: Gain = 0.0
+    I_z: Gain = 0.0
+    D_z: Gain = 0.0
+    P_theta: Gain = 0.0
+    I_theta: Gain = 0.0
+    D_theta: Gain = 0.0
+    P_y: Gain = 0.0
+    I_y: Gain = 0.0
+    D_y: Gain = 0.0
+    P_psi: Gain = 0.0
+    I_psi: Gain = 0.0
+    D_psi: Gain = 0.0
+    P_r: Gain = 0.0
+    I_r: Gain = 0.0
+    D_r: Gain = 0.0
     step: list[PlaneStep] = Field(default_factory=list)
 
     @model_validator(mode="after")
@@ -227,9 +233,9 @@ class SpeedCommand(Data):
     """
 
     law: Literal["fixed", "pid", "programme"]
-    P_u: float = 0.0
-    I_u: float = 0.0
-    D_u: float = 0.0
+    P_u: Gain = 0.0
+    I_u: Gain = 0.0
+    D_u: Gain = 0.0
     limits_rps: Annotated[list[float], Field(min_length=2, max_length=2)] | None = None
     step: list[SpeedStep] = Field(default_factory=list)
 
@@ -256,12 +262,12 @@ class TankCommand(Data):
 
     law: Literal["fixed", "pid"]
     value: float = 0.0
-    P_z: float = 0.0
-    I_z: float = 0.0
-    D_z: float = 0.0
-    P_theta: float = 0.0
-    I_theta: float = 0.0
-    D_theta: float = 0.0
+    P_z: Gain = 0.0
+    I_z: Gain = 0.0
+    D_z: Gain = 0.0
+    P_theta: Gain = 0.0
+    I_theta: Gain = 0.0
+    D_theta: Gain = 0.0
 
     def gains(self) -> list[float]:
         """P I D on depth [per m] and on pitch [per rad]."""
