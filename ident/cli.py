@@ -12,7 +12,7 @@ import click
 from ident import __version__
 from ident.commands import animate, campaigns, doctor, exports, flights, maneuvers, start, trials, versions
 from ident.commands.log import LEVELS, log_level
-from ident.commands.process import Terminated, ends_when_asked, ready_streams, silence
+from ident.commands.process import Asked, ends_when_asked, ready_streams, silence
 from ident.commands.shared import inputs_kept
 from ident.text import visible
 
@@ -40,9 +40,11 @@ class Commands(click.Group):
             ctx.exit(1)
         except (click.exceptions.Exit, click.ClickException):
             raise
-        except (KeyboardInterrupt, Terminated) as asked:
-            click.echo("\nInterrupted." if isinstance(asked, KeyboardInterrupt) else "\nTerminated.", err=True)
-            ctx.exit(128 + (signal.SIGINT if isinstance(asked, KeyboardInterrupt) else signal.SIGTERM))
+        except (Asked, KeyboardInterrupt) as given:
+            # Outside of the main thread, and where there are no signals of POSIX, it is Python's own.
+            asked = given if isinstance(given, Asked) else Asked(signal.SIGINT)
+            click.echo(f"\n{asked.said}", err=True)
+            ctx.exit(asked.code)
         except MemoryError:
             _refuse(ctx, "memory", "more was asked for than there is", "smaller files, fewer samples, shorter runs")
         except OSError as error:

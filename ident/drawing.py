@@ -5,14 +5,19 @@ Matplotlib is imported where something is drawn, not before.
 
 from __future__ import annotations
 
+import contextlib
+import functools
+import logging
 import multiprocessing
 import os
+import signal
 import threading
-from collections.abc import Callable, Iterable, Sequence
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -20,6 +25,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 T = TypeVar("T")
+_log = logging.getLogger(__name__)
+# What ends a command: see ident.commands.process.
+_ASKS = (signal.SIGINT, signal.SIGTERM)
 
 # Figures for which another process is worth its start.
 _WORTH = 4
@@ -119,14 +127,66 @@ def _end_with_parent() -> None:
 
 def _ready(read: Iterable[Path] | None) -> None:
     """A process that draws: what the command has read it does not write over; it ends when the command does."""
-    import signal
-
     from sim.files import inputs
 
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with_parent, daemon=True).start()
     if read is not None:
         inputs.begin(read)
+    if hasattr(signal, "pthread_sigmask"):
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, _ASKS)
+
+
+@contextlib.contextmanager
+def _unheard() -> Iterator[None]:
+    """Signals wait: a process that is started meanwhile meets none before it is ready for it."""
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, _ASKS)
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+class _Shared(Generic[T]):
+    """Jobs that are done here, from the front, and by a pool, from the back: each process has one at a time."""
+
+    def __init__(self, draw: Callable[..., T], jobs: Sequence[tuple[Any, ...]]) -> None:
+        self.draw, self.jobs = draw, jobs
+        self.left = deque(range(len(jobs)))
+        self.given: dict[int, Future[T]] = {}
+        self.drawn: dict[int, T] = {}
+
+    def give(self, pool: ProcessPoolExecutor, done: Future[T] | None = None) -> None:
+        """Give the last job that is left to a pool, and the next one when that is done."""
+        try:
+            job = self.left.pop()
+        except IndexError:
+            return
+        try:
+            self.given[job] = future = pool.submit(self.draw, *self.jobs[job])
+        except RuntimeError:
+            # A pool that has ended, or one of whose processes has.
+            self.left.append(job)
+            return
+        future.add_done_callback(functools.partial(self.give, pool))
+
+    def here(self) -> None:
+        """Do what is left, and what a process that ended has not done."""
+        while len(self.drawn) < len(self.jobs):
+            while self.left:
+                with contextlib.suppress(IndexError):
+                    job = self.left.popleft()
+                    self.drawn[job] = self.draw(*self.jobs[job])
+            for job, future in list(self.given.items()):
+                try:
+                    self.drawn[job] = future.result()
+                except BrokenProcessPool:
+                    _log.warning("a process that draws has ended: what it was to draw is drawn here")
+                    self.left.append(job)
+                del self.given[job]
 
 
 def beside(draw: Callable[..., T], jobs: Sequence[tuple[Any, ...]], workers: int = 1) -> list[T]:
@@ -149,20 +209,14 @@ def beside(draw: Callable[..., T], jobs: Sequence[tuple[Any, ...]], workers: int
     others = min(workers or cores(), len(jobs) // 2) - 1
     if others < 1 or len(jobs) < _WORTH:
         return [draw(*job) for job in jobs]
-    start = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(others, start, _ready, (inputs.noted(),)) as pool:
-        waiting = [pool.submit(draw, *job) for job in reversed(jobs)][::-1]
-        try:
-            return [_here_or_there(draw, job, one) for job, one in zip(jobs, waiting, strict=True)]
-        finally:
-            pool.shutdown(wait=False, cancel_futures=True)
-
-
-def _here_or_there(draw: Callable[..., T], job: tuple[Any, ...], waiting: Future[T]) -> T:
-    """A job that nobody has begun is done here; so is one whose process ended or never came up."""
-    if waiting.cancel():
-        return draw(*job)
+    shared = _Shared(draw, jobs)
+    pool = ProcessPoolExecutor(others, multiprocessing.get_context("spawn"), _ready, (inputs.noted(),))
     try:
-        return waiting.result()
-    except BrokenProcessPool:
-        return draw(*job)
+        with _unheard():
+            for _ in range(others):
+                shared.give(pool)
+        shared.here()
+    finally:
+        shared.left.clear()
+        pool.shutdown(wait=False, cancel_futures=True)
+    return [shared.drawn[k] for k in range(len(jobs))]

@@ -33,6 +33,20 @@ def test_refusal_of_another_process_arrives_as_it_is(tmp_path):
     assert (refused.value.where, refused.value.found) == (str(taken), "a file")
 
 
+def dies_elsewhere(parent: int, number: int) -> int:
+    if os.getpid() != parent:
+        os._exit(1)
+    return number
+
+
+def test_what_a_process_that_ended_had_to_draw_is_drawn_here(caplog, capfd):
+    """One line says so; nothing of the pool's own is printed."""
+    jobs = [(os.getpid(), k) for k in range(8)]
+    assert beside(dies_elsewhere, jobs, workers=3) == list(range(8))
+    assert "a process that draws has ended" in caplog.text
+    assert capfd.readouterr().err == ""
+
+
 def test_another_process_does_not_write_over_what_was_read_either(tmp_path):
     read = tmp_path / "input.png"
     read.write_text("", "utf-8")

@@ -7,7 +7,7 @@ import os
 import signal
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from types import FrameType
 from typing import NoReturn
 
@@ -15,8 +15,29 @@ from typing import NoReturn
 _GRACE = 1.0
 
 
-class Terminated(BaseException):
-    """The process was asked to end (SIGTERM)."""
+class Asked(BaseException):
+    """The process was asked to end, by Ctrl-C (SIGINT) or by SIGTERM.
+
+    No ``KeyboardInterrupt``: libraries answer that one themselves, with other words and another code.
+
+    Attributes
+    ----------
+    number : Of the signal.
+    """
+
+    def __init__(self, number: int) -> None:
+        super().__init__(number)
+        self.number = number
+
+    @property
+    def said(self) -> str:
+        """For people."""
+        return "Interrupted." if self.number == signal.SIGINT else "Terminated."
+
+    @property
+    def code(self) -> int:
+        """Exit code, as a shell counts."""
+        return 128 + self.number
 
 
 def ready_streams() -> None:
@@ -47,8 +68,18 @@ def silence(name: str) -> None:
         os.close(nowhere)
 
 
-def _terminate(number: int, frame: FrameType | None) -> None:
-    raise Terminated
+def _ask(number: int, frame: FrameType | None) -> None:
+    raise Asked(number)
+
+
+def _unraisable(before: Callable[[sys.UnraisableHookArgs], object]) -> Callable[[sys.UnraisableHookArgs], object]:
+    """Where nothing can be raised, as when an object is deleted, a signal is no fault to be printed."""
+
+    def show(what: sys.UnraisableHookArgs) -> None:
+        if not issubclass(what.exc_type, Asked):
+            before(what)
+
+    return show
 
 
 def _watch(pipe: int, ended: threading.Event) -> None:
@@ -71,9 +102,9 @@ def _leave(code: int) -> NoReturn:
 def ends_when_asked() -> Iterator[None]:
     """Ctrl-C and SIGTERM end what runs inside within two seconds, in native code and worker threads too.
 
-    The signal raises ``KeyboardInterrupt`` or ``Terminated`` where Python code runs. When a compiled loop or
-    a pool of threads keeps that from happening, the process ends all the same: that is as safe as a kill,
-    which leaves no half-written file under its name and no half version in a database.
+    The signal raises ``Asked`` where Python code runs. When a compiled loop, a pool of threads or code that
+    swallows it keeps that from happening, the process ends all the same: that is as safe as a kill, which
+    leaves no half-written file under its name and no half version in a database.
     """
     if os.name != "posix" or threading.current_thread() is not threading.main_thread():
         yield
@@ -81,11 +112,17 @@ def ends_when_asked() -> Iterator[None]:
     pipe, end = os.pipe()
     os.set_blocking(end, False)
     ended = threading.Event()
-    before = signal.signal(signal.SIGTERM, _terminate)
+    before = {number: signal.signal(number, _ask) for number in (signal.SIGINT, signal.SIGTERM)}
+    hook, sys.unraisablehook = sys.unraisablehook, _unraisable(sys.unraisablehook)
     told = signal.set_wakeup_fd(end, warn_on_full_buffer=False)
     threading.Thread(target=_watch, args=(pipe, ended), daemon=True).start()
     try:
-        yield
+        try:
+            yield
+        except Asked as asked:
+            # Before a command began, or after it ended.
+            os.write(2, f"\n{asked.said}\n".encode())
+            raise SystemExit(asked.code) from None
     except SystemExit as asked:
         if asked.code in (128 + signal.SIGINT, 128 + signal.SIGTERM) and sys.stdout is sys.__stdout__:
             # Python would wait for the threads of a pool, and change the code where it met the signal itself.
@@ -94,5 +131,7 @@ def ends_when_asked() -> Iterator[None]:
     finally:
         ended.set()
         signal.set_wakeup_fd(told)
-        signal.signal(signal.SIGTERM, before)
+        for number, handler in before.items():
+            signal.signal(number, handler)
+        sys.unraisablehook = hook
         os.close(end)
