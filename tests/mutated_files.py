@@ -28,6 +28,8 @@ from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from slips_of_a_hand import statement, table
+
 if TYPE_CHECKING:
     import pandas as pd
 
@@ -207,8 +209,8 @@ def _work_kept() -> None:
 class Room:
     """A folder with whole files beside each other, and what is done with one of them."""
 
-    def __init__(self, folder: Path, db: str, each: int = 1) -> None:
-        self.folder, self.db, self.each = folder, db, each
+    def __init__(self, folder: Path, db: str, each: int = 1, by_hand: bool = False) -> None:
+        self.folder, self.db, self.each, self.by_hand = folder, db, each, by_hand
         self.rows: dict[str, pd.DataFrame] = {}
         self.fleet = _fleet(db)
         self.asked = 0
@@ -216,9 +218,9 @@ class Room:
         shutil.copytree(str(files("sim") / "cases"), folder / "cases", dirs_exist_ok=True)
         shutil.copytree(str(_STARTER), folder / "starter", dirs_exist_ok=True)
         shutil.copytree(str(files("ident") / "calibrations"), folder / "calibrations", dirs_exist_ok=True)
-        for table in (folder / "starter" / "captive").glob("*.csv"):
-            if table.stem not in _TESTS_KEPT:
-                table.unlink()
+        for runs in (folder / "starter" / "captive").glob("*.csv"):
+            if runs.stem not in _TESTS_KEPT:
+                runs.unlink()
         for case in (folder / "cases").glob("*.toml"):
             text = re.sub(r"(?m)^duration_s = .*", "duration_s = 8.0", case.read_text("utf-8"))
             case.write_text(text, "utf-8")
@@ -247,7 +249,10 @@ class Room:
         name = rng.choices(self.whole[kind], [_RARE.get(n, 1.0) for n in self.whole[kind]])[0]
         text = self.given[name]
         path = self.folder / name
-        made = mutated_table(rng, text) if name.endswith(".csv") else mutant(rng, text)
+        of_table, of_statement = (table, statement) if self.by_hand else (mutated_table, mutant)
+        made = text
+        while made == text:
+            made = of_table(rng, text) if name.endswith(".csv") else of_statement(rng, text)
         path.write_text(made, "utf-8", newline="")
         return path, name
 
@@ -374,7 +379,8 @@ def slips(room: Room, path: Path, name: str) -> list[str]:
     """Lines that a mutant lost (-) and got (+)."""
     given, made = room.given[name].split("\n"), path.read_bytes().decode("utf-8").split("\n")
     lines = [x for x in difflib.unified_diff(given, made, lineterm="", n=0) if not x.startswith(("---", "+++", "@@"))]
-    return [x[:160] for x in lines[:8]]
+    lost, got = ([x[:160] for x in lines if x[0] == sign] for sign in "-+")
+    return [*lost[:4], *got[:4], f"{len(lost)} lines lost, {len(got)} got"]
 
 
 def outcome(room: Room, kind: str, seed: int) -> tuple[str, str, list[str]]:
@@ -414,10 +420,10 @@ def digest(folder: str) -> str:
     return whole.hexdigest()
 
 
-def _some(kind: str, first: int, last: int, db: str, log: Path, each: int) -> None:
+def _some(kind: str, first: int, last: int, db: str, log: Path, each: int, by_hand: bool) -> None:
     _work_kept()
     with tempfile.TemporaryDirectory() as folder:
-        room = Room(Path(folder), db, each)
+        room = Room(Path(folder), db, each, by_hand)
         with log.open("a", encoding="utf-8") as out:
             for seed in range(first, last):
                 out.write(f"{seed} begun\n")
@@ -441,11 +447,12 @@ def main() -> int:
     parser.add_argument("--slowest", type=float, default=60.0, help="Longest time for one of them [s].")
     parser.add_argument("--sample", type=int, default=0, help="Print so many of those that were used.")
     parser.add_argument("--whole-each", type=int, default=10, help="Each so many-th is flown or fitted; all are read.")
+    parser.add_argument("--by-hand", action="store_true", help="Slips that people make: slips_of_a_hand.py.")
     parser.add_argument("--some", action="store_true", help=argparse.SUPPRESS)
     given = parser.parse_args()
     log = given.log or Path(f"{given.kind}.txt")
     if given.some:
-        _some(given.kind, given.first, given.first + given.count, given.db, log, given.whole_each)
+        _some(given.kind, given.first, given.first + given.count, given.db, log, given.whole_each, given.by_hand)
         return 0
     log.write_text("", "utf-8")
     with tempfile.TemporaryDirectory() as folder:
@@ -470,7 +477,7 @@ def _watched(given: argparse.Namespace, db: str, log: Path) -> tuple[list[int], 
     while first < last:
         upto = min(first + _EACH, last)
         command = [sys.executable, __file__, kind, str(upto - first), "--first", str(first), "--db", db]
-        command += ["--whole-each", str(given.whole_each)]
+        command += ["--whole-each", str(given.whole_each), *(["--by-hand"] if given.by_hand else [])]
         ended = False
         with subprocess.Popen([*command, "--log", str(log), "--some"]) as process:
             started, seen, since = False, -1, time.monotonic()
