@@ -90,6 +90,14 @@ def test_the_starter_is_in_the_package():
     assert {p for p in (here / "starter" / "files").rglob("*") if p.is_file()} <= carried
 
 
+@pytest.mark.parametrize("package", ["ident", "sim"])
+def test_every_data_file_is_in_the_package(package):
+    settings = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["tool"]["setuptools"]
+    carried = {p for pattern in settings["package-data"][package] for p in (ROOT / package).glob(pattern)}
+    there = {p for p in (ROOT / package).rglob("*") if p.is_file() and "__pycache__" not in p.parts}
+    assert {p for p in there if p.suffix != ".py"} <= carried
+
+
 @pytest.mark.parametrize("kind", KINDS)
 def test_every_key_has_a_meaning(kind):
     found = keys(kind)
