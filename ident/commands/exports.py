@@ -13,14 +13,19 @@ from ident.text import on_screen, visible
 # Formats that write the coefficients, and those that write a boat in a case.
 _ROWS = ("csv", "parquet", "json")
 _FLOWN = ("c", "fmu")
-_VEHICLE = ("daveml",)
+_VEHICLE = ("daveml", "jsbsim", "gazebo")
 _CASE = "hzz20"
 
 
 @click.command()
 @click.argument("path", type=click.Path(path_type=Path))
 @click.option("--format", "kind", type=click.Choice([*_ROWS, *_FLOWN, *_VEHICLE]), default="csv", show_default=True)
-@click.option("--case", "case", default=None, help=f"With --format {', '.join(_FLOWN)}: start, water, step; {_CASE}.")
+@click.option(
+    "--case",
+    "case",
+    default=None,
+    help=f"With --format {', '.join((*_FLOWN, *_VEHICLE))}: boat, start, water, step; {_CASE} without.",
+)
 @click.option("--vehicle", default=None, help="With --case: bundled vehicle or vehicle file, instead of the case's.")
 @click.option(
     "--fmi", type=click.Choice(["2", "3"]), default=None, help="With --format fmu: version of FMI, 2 without."
@@ -44,16 +49,19 @@ def export(
     covariance and digest, which `ident import` reads back. c: the boat in a case as one header and
     one source of C99, which step as the simulator does. fmu: the same as an FMU for co-simulation, with its sources,
     compiled by the C compiler of this machine; PATH is FILE.fmu. daveml: the tables of the case's vehicle with check
-    cases (ANSI/AIAA S-119); PATH is FILE.dml.
+    cases (ANSI/AIAA S-119); PATH is FILE.dml. jsbsim: an aircraft file whose external reactions are the boat's loads;
+    PATH is NAME/NAME.xml. gazebo: an SDF model with the terms of Gazebo's hydrodynamics plugin, fitted where they are
+    tables here; PATH is FILE.sdf. What a format cannot hold is printed, and stands in its file.
 
     \b
     Example: ident export --version 0 --format csv exported/
              ident export --format c --case ss5-4m exported/
              ident export --format fmu --case hzz20 hzz20.fmu
              ident export --format daveml bb2.dml
+             ident export --format gazebo --case hzz20 bb2.sdf
     """
     if kind in _ROWS and (case or vehicle):
-        raise click.UsageError(f"--case and --vehicle go with --format {', '.join(_FLOWN)}")
+        raise click.UsageError(f"--case and --vehicle go with --format {', '.join((*_FLOWN, *_VEHICLE))}")
     if fmi and kind != "fmu":
         raise click.UsageError("--fmi goes with --format fmu")
     console = console_for(quiet=json_path == "-")
@@ -65,6 +73,8 @@ def export(
     if json_path != "-":
         for name in done.get("files", [done.get("file")]):
             click.echo(visible(name))
+        for one in done.get("lost", ()):
+            click.echo(visible(f"lost: {one}"), err=True)
     if json_path:
         emit(done, json_path)
 
@@ -98,6 +108,14 @@ def _flown(
             from ident.exports.daveml import export_daveml
 
             return export_daveml(boat, db, path)
+        if kind == "jsbsim":
+            from ident.exports.jsbsim import export_jsbsim
+
+            return export_jsbsim(boat, case, db, path)
+        if kind == "gazebo":
+            from ident.exports.gazebo import export_gazebo
+
+            return export_gazebo(boat, case, db, path)
         if kind == "c":
             from ident.exports.c_source import export_c
 
