@@ -23,6 +23,12 @@ SAMPLES, SEED = 100, 1
 # Metrics shown of a case, by what is flown.
 _SHOWN = ("advance_90_heading_m", "tactical_diameter_180_heading_m", "overshoot_1_deg", "overshoot_2_deg")
 _BOATS = ("kvlcc2-", "remus", "lauv", "nps-", "suboff-")
+# Groups of cases that printed or measured values are counted of, by the beginnings of their names.
+_GROUPS = {
+    "`kvlcc2`, model scale, beside the free model": ("kvlcc2-turn", "kvlcc2-zz"),
+    "`kvlcc2-ship`, full scale, beside the free model": ("kvlcc2-ship-",),
+    "`kvlcc2-mmg`, beside what the paper calculated": ("kvlcc2-mmg-",),
+}
 
 
 def campaigns() -> dict[str, Any]:
@@ -77,19 +83,30 @@ def suboff_differences() -> str:
 
 def predictions(db: str) -> str:
     """Metrics of the cases of other boats with 95 % bands, from the versions in ``db``."""
-    rows = []
+    rows: list[list[str]] = []
     for name in bundled("cases"):
-        if not name.startswith(_BOATS):
-            continue
-        done = ident.validate(name, db=db).with_bands(SAMPLES, SEED)
-        rows += _of_case(name, done)
-    return table(["case", "metric", "predicted", "95 % band", "printed or measured", "ratio"], rows)
+        if name.startswith(_BOATS):
+            rows += _of_case(name, ident.validate(name, db=db).with_bands(SAMPLES, SEED))
+    head = ["case", "metric", "predicted", "95 % band", "printed or measured", "by", "ratio", "in the band"]
+    said = [_counted(rows, label, of) for label, of in _GROUPS.items()]
+    return "\n".join([*said, "", table(head, rows)])
+
+
+def _counted(rows: list[list[str]], label: str, beginnings: tuple[str, ...]) -> str:
+    """One line on how many of a group's printed or measured values were met."""
+    held = [r for r in rows if r[0].strip("`").startswith(beginnings) and r[5] != "-"]
+    inside, ratios = sum(r[7] == "yes" for r in held), [float(r[6]) for r in held]
+    near = [sum(abs(r - 1.0) <= share + 1e-9 for r in ratios) for share in (0.03, 0.15)]
+    turns = [float(r[6]) for r in held if r[1].endswith("[L]")]
+    return (
+        f"* {label}: {inside} of {len(held)} in the 95 % band; {near[0]} within 3 %, {near[1]} within 15 %; "
+        f"turning circles between {min(turns):.2f} and {max(turns):.2f} of them."
+    )
 
 
 def _of_case(name: str, done: Validation) -> list[list[str]]:
     case, _ = load_case(name)
     length = load_vehicle(case.vehicle).particulars.length.value
-    printed = {p.metric: p for p in case.published}
     lines = []
     for metric in _SHOWN:
         if metric not in done.metrics or done.metrics[metric].get("simulated") is None:
@@ -99,8 +116,11 @@ def _of_case(name: str, done: Validation) -> list[list[str]]:
         low, high = (drawn[int(0.025 * len(drawn))], drawn[int(0.975 * (len(drawn) - 1))]) if drawn else (value, value)
         scale, unit = (length, "L") if metric.endswith("_m") else (1.0, "deg")
         label = metric.rsplit("_", 1)[0].replace("_", " ") + f" [{unit}]"
-        there = printed.get(metric)
-        rows = [f"`{name}`", label, f"{value / scale:.2f}", f"{low / scale:.2f} to {high / scale:.2f}"]
-        rows += [f"{there.value / scale:.2f}", f"{value / there.value:.2f}"] if there else ["-", "-"]
-        lines.append(rows)
+        flown = [f"`{name}`", label, f"{value / scale:.2f}", f"{low / scale:.2f} to {high / scale:.2f}"]
+        there = [p for p in case.published if p.metric == metric]
+        for p in there:
+            inside = "yes" if low <= p.value <= high else "no"
+            lines.append([*flown, f"{p.value / scale:.2f}", p.source, f"{value / p.value:.3f}", inside])
+        if not there:
+            lines.append([*flown, "-", "-", "-", "-"])
     return lines

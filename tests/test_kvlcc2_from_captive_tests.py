@@ -63,6 +63,21 @@ def test_a_tanker_turns_within_what_imo_asks_and_is_slowed_by_it(name, scale):
     assert 0.1 < flight["u"][-1] / flight["u"][0] < 0.5
 
 
+@pytest.mark.parametrize("side", ["starboard", "port"])
+def test_turning_circles_are_those_of_the_free_model(side):
+    """MARIN's free model (SIMMAN 2008) within 15 %; no free-running test entered the coefficients."""
+    case, _ = load_case(f"kvlcc2-turn35-{side}")
+    flight = simulate(case, _bundled("kvlcc2"))
+    turned = np.abs(flight["psi"])
+    found = {
+        "advance_90_heading_m": np.interp(np.pi / 2.0, turned, flight["x"] - flight["x"][0]),
+        "tactical_diameter_180_heading_m": np.interp(np.pi, turned, np.abs(flight["y"])),
+    }
+    assert [p.metric for p in case.published] == list(found)
+    for p in case.published:
+        assert found[p.metric] == pytest.approx(p.value, rel=0.15), p.metric
+
+
 def test_zigzags_reverse_at_their_check_angle():
     case, _ = load_case("kvlcc2-zz20-20")
     flight = simulate(case, _bundled("kvlcc2"))

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+import ident
 from ident.captive.campaign import read_campaign
 from ident.database.store import database_rows
 from ident.identification.identify import identify
@@ -18,6 +19,7 @@ from sim.boat.coefficients import Coefficients
 from sim.boat.mass import Environment
 from sim.boat.vehicle import load_vehicle
 from sim.files.errors import InputError
+from sim.files.toml_files import bundled
 from sim.flight.case import load_case
 from sim.flight.simulate import simulate
 from sim.kernel import layout, plain
@@ -26,10 +28,11 @@ from sim.kernel.assemble import Assembly, assemble
 
 ROOT = Path(__file__).parents[1]
 WATER = Environment(1000.0, 9.81)
-# Tables 1 to 3 of the paper, forces over 1/2 rho L d U^2.
+# Tables 1 to 3 of the paper, forces over 1/2 rho L d U^2; resistance and place of the propeller as in
+# sim/vehicles/kvlcc2-mmg_errata.csv.
 LENGTH, DRAUGHT, MASS, X_G, DIAMETER, HEIGHT, AREA = 7.0, 0.46, 3270.0, 0.25, 0.216, 0.345, 0.0539
 HULL = {
-    "X": ((0, 0, -0.022), (2, 0, -0.040), (1, 1, 0.002), (0, 2, 0.011), (4, 0, 0.771)),
+    "X": ((0, 0, -0.0162), (2, 0, -0.040), (1, 1, 0.002), (0, 2, 0.011), (4, 0, 0.771)),
     "Y": ((1, 0, -0.315), (0, 1, 0.083), (3, 0, -1.607), (2, 1, 0.379), (1, 2, -0.391), (0, 3, 0.008)),
     "N": ((1, 0, -0.137), (0, 1, -0.049), (3, 0, -0.030), (2, 1, -0.294), (1, 2, 0.055), (0, 3, -0.013)),
 }
@@ -42,7 +45,7 @@ def forces(u, v, r, delta, n):
     size = 500.0 * LENGTH * DRAUGHT * speed**2
     x, y, moment = (size * sum(c * sway**i * yaw**j for i, j, c in HULL[k]) for k in "XYN")
     moment *= LENGTH
-    beta_p = beta + 0.690 * yaw
+    beta_p = beta + 0.480 * yaw
     c_2 = 1.6 if beta_p > 0.0 else 1.1
     wake = 1.0 - 0.60 * (1.0 + (1.0 - math.exp(-2.0 * abs(beta_p))) * (c_2 - 1.0))
     advance = u * (1.0 - wake) / (n * DIAMETER)
@@ -105,6 +108,19 @@ def test_the_turning_circle_is_that_of_the_papers_equations(turn):
         here = np.interp(np.radians(angle), flight["psi"], flight[ours] - flight[ours][0])
         assert here == pytest.approx(there, rel=1e-3)
     assert 2.5 < np.interp(np.pi, flight["psi"], flight["y"]) / LENGTH < 4.0
+
+
+def test_the_papers_own_turning_circles_and_overshoots_come_out(tmp_path):
+    """Tables 4 and 5 of the paper, its calculation at model scale: 3 %, but for one overshoot of 10.2 deg, 3.3 %."""
+    ident.fit(ROOT / "raw_captive_data" / "kvlcc2-mmg", db=tmp_path / "db")
+    off = {}
+    for name in sorted(n for n in bundled("cases") if n.startswith("kvlcc2-mmg-")):
+        done = ident.validate(name, db=tmp_path / "db")
+        for p in done.case.published:
+            off[name, p.metric] = abs(done.metrics[p.metric].simulated / p.value - 1.0)
+    assert len(off) == 10
+    assert sum(x <= 0.03 for x in off.values()) >= 9, off
+    assert max(off.values()) <= 0.035, off
 
 
 def test_heave_roll_and_pitch_are_held(turn):
