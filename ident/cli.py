@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from ident.commands import starting  # noqa: F401
+
+# isort: split
 import os
 import signal
 import sys

@@ -65,7 +65,11 @@ def asked(here: Path, command: tuple[str, ...], after: float, number: int, fresh
         pass
     begun = time.monotonic()
     (os.killpg if number == signal.SIGINT else os.kill)(process.pid, number)
-    _, said = process.communicate()
+    try:
+        _, said = process.communicate(timeout=30.0)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        return "asked (0), exit code 0 after 30 s", ["does not end", process.communicate()[1].decode()[-1500:]]
     took = time.monotonic() - begun
     wrong = []
     if process.returncode != 128 + number and process.returncode != -number:
