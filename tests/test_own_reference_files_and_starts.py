@@ -212,3 +212,21 @@ def test_other_vehicle_by_option(fitted_db):
     assert validate("meander", fitted_db, vehicle="bb2").to_dict()["vehicle"] == "bb2"
     with pytest.raises(InputError, match="no such file or bundled name"):
         validate("meander", fitted_db, vehicle="bb3")
+
+
+def test_a_misprinted_point_of_a_reference_is_said(tmp_path):
+    """A decimal point that was lost: no boat goes there and back between two samples."""
+    from ident.validation.references import check_reference
+    from ident.validation.trial_reference import referenced
+
+    case, where = load_case("turn20-23.69m")
+    assert check_reference(case, referenced(case, where).series, where) == []
+    text = (files("sim") / "cases" / "data" / "turn20_23.69m.csv").read_text("utf-8")
+    assert "CFD,x,780.0,-127.51," in text
+    (tmp_path / "data").mkdir()
+    (tmp_path / "data" / "turn20_23.69m.csv").write_text(text.replace("CFD,x,780.0,-127.51,", "CFD,x,780.0,-12751,"))
+    beside = str(tmp_path / "turn.toml")
+    (said,) = check_reference(case, referenced(case, beside).series, beside)
+    assert "points of x are far from their neighbours" in said
+    assert "1 of 227" in said
+    assert "the first at s = 780" in said

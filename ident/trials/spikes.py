@@ -15,6 +15,8 @@ Array = NDArray[np.float64]
 _ANGLES = ("psi", "course")
 # So many robust standard deviations from the median of five.
 _FAR = 12.0
+# Samples that show what is usual, and the part of them that may be spikes: more are another motion.
+_FEWEST, _MOST = 9, 0.05
 
 
 def _away(value: Array, angle: bool) -> Array:
@@ -27,20 +29,39 @@ def _away(value: Array, angle: bool) -> Array:
     return np.asarray(np.median(around, axis=1) - value)
 
 
+def far_from_neighbours(value: Array, angle: bool = False) -> NDArray[np.bool_]:
+    """Single samples that the ones around them do not lead to.
+
+    Parameters
+    ----------
+    value : (n,) Samples in their order, as often as a boat's motion asks for.
+    angle : Whether they are directions [rad], which come round.
+
+    Returns
+    -------
+    (n,) True for samples further from the median of five than twelve robust standard deviations and than
+    five large steps; none of fewer than nine samples, nor where more than a twentieth is.
+    """
+    none = np.zeros(len(value), dtype=bool)
+    if len(value) < _FEWEST:
+        return none
+    away = np.abs(_away(value, angle))
+    usual = MAD_TO_SIGMA * float(np.median(away))
+    steps = np.diff(value)
+    steps = np.abs(np.angle(np.exp(1j * steps)) if angle else steps)
+    limit = max(_FAR * usual, 5.0 * float(np.percentile(steps, 95)), 1e-9)
+    bad = np.asarray(away > limit)
+    return bad if bad.mean() <= _MOST else none
+
+
 def without_spikes(one: Recording) -> Recording:
     """A recording less its spikes, with a finding for each channel that has some."""
     channels, findings = dict(one.channels), list(one.findings)
     for name, record in one.channels.items():
-        if len(record) < 9 or name in ("dH", "dV", "dH_order", "n"):
+        if name in ("dH", "dV", "dH_order", "n"):
             continue
-        away = np.abs(_away(record.value, name in _ANGLES))
-        usual = MAD_TO_SIGMA * float(np.median(away))
-        steps = np.abs(np.diff(record.value))
-        if name in _ANGLES:
-            steps = np.abs(np.angle(np.exp(1j * np.diff(record.value))))
-        limit = max(_FAR * usual, 5.0 * float(np.percentile(steps, 95)), 1e-9)
-        bad = away > limit
-        if not bad.any() or bad.mean() > 0.05:
+        bad = far_from_neighbours(record.value, name in _ANGLES)
+        if not bad.any():
             continue
         rows = tuple(one.row_at(float(t)) for t in record.abscissa[bad])
         size = float(record.value[bad][0])

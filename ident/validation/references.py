@@ -7,6 +7,7 @@ import re
 import numpy as np
 from numpy.typing import NDArray
 
+from ident.trials.spikes import far_from_neighbours
 from sim.files.errors import InputError
 from sim.flight.case import Case
 from sim.flight.series import Series
@@ -45,7 +46,22 @@ def check_reference(case: Case, reference: Series, where: str) -> list[str]:
         for unit in sorted(units - allowed):
             text = f"{channel} in {unit!r}"
             raise InputError(case.reference.file or where, text, " or ".join(sorted(allowed)))
-    return _unknown(case.reference.file or where, reference)
+    return [*_unknown(case.reference.file or where, reference), *_spikes(case, reference)]
+
+
+def _spikes(case: Case, reference: Series) -> list[str]:
+    """Single samples far from their neighbours: they are compared, and said."""
+    said = []
+    for source, channels in reference.data.items():
+        for name in case.reference.channels if case.reference else ():
+            record = channels.get(name)
+            bad = far_from_neighbours(record.value) if record is not None else np.zeros(0, dtype=bool)
+            if record is None or not bad.any():
+                continue
+            at = f"{reference.abscissa} = {float(record.abscissa[bad][0]):.4g}"
+            text = f"{int(bad.sum())} of {len(bad)} points of {name} are far from their neighbours, the first at {at}"
+            said.append(f"reference {source}: {text}: a misprint? They are compared as they stand")
+    return said
 
 
 def _unknown(file: str, reference: Series) -> list[str]:
