@@ -99,3 +99,13 @@ def test_figure_of_roots_and_answers(found, tmp_path):
         assert stability_figure(found, tmp_path / f"roots{ending}").stat().st_size > 5000
     with pytest.raises(ident.InputError, match=r"\.png"):
         stability_figure(found, tmp_path / "roots.jpg")
+
+
+def test_there_is_no_linear_model_about_revolutions_that_the_propeller_lacks(coefficients, environment):
+    from ident.analysis.stability import stability_at
+    from ident.analysis.state_space import state_space
+
+    fast = stability_at(coefficients, environment, 60.0, DEPTH)
+    assert fast.linear == {}
+    with pytest.raises(ident.InputError, match="propeller's limits"):
+        state_space(coefficients, environment, 60.0, DEPTH, 0.1)

@@ -21,6 +21,7 @@ from sim.boat.mass import Environment, added_mass_matrix
 from sim.boat.vehicle import Vehicle, load_vehicle
 from sim.files.errors import InputError
 from sim.flight.case import Case, load_case
+from sim.flight.plausible import within_limits
 from sim.flight.simulate import environment_of, mixer_of, plane_limits
 from sim.flight.trim import NoEquilibrium, self_propulsion
 from sim.kernel.assemble import assemble
@@ -121,6 +122,8 @@ def _linear_models(
     else:
         try:
             trim = self_propulsion(model, mixer_of(vehicle), speed, depth, plane_limits(vehicle)[0])
+            limits = vehicle.needed_propeller("self-propulsion").limits.value
+            within_limits(float(trim.controls[len(vehicle.planes)]), limits, speed, depth)
         except NoEquilibrium:
             return {}, about
         state, controls = trim.state, trim.controls

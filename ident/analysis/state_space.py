@@ -18,6 +18,7 @@ from sim.boat.catalogue import OUTPUTS, STATES
 from sim.boat.coefficients import Coefficients
 from sim.boat.mass import Environment
 from sim.files.errors import InputError
+from sim.flight.plausible import within_limits
 from sim.flight.simulate import mixer_of, plane_limits
 from sim.flight.trim import NoEquilibrium, self_propulsion
 from sim.kernel import rhs as kernel
@@ -101,6 +102,8 @@ def state_space(
         )
     try:
         trim = self_propulsion(model, mixer_of(vehicle), speed, depth, plane_limits(vehicle)[0])
+        limits = vehicle.needed_propeller("self-propulsion").limits.value
+        within_limits(float(trim.controls[planes]), limits, speed, depth)
     except NoEquilibrium as error:
         raise InputError(where, str(error), "a speed and depth that the boat can hold") from error
     tanks = vehicle.tanks is not None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from sim.boat.catalogue import held
@@ -60,11 +61,29 @@ def check_revolutions(case: Case, vehicle: Vehicle, needed: float) -> None:
     NoEquilibrium
         When they are beyond the limits.
     """
-    low, high = case.command.n.limits_rps or vehicle.needed_propeller("a flight").limits.value
+    limits = case.command.n.limits_rps or vehicle.needed_propeller("a flight").limits.value
+    within_limits(needed, limits, case.initial.speed_mps, case.initial.depth_m)
+
+
+def within_limits(needed: float, limits: Sequence[float], speed: float, depth: float) -> None:
+    """Refuse revolutions that a propeller does not have.
+
+    Parameters
+    ----------
+    needed : Revolutions of the self-propulsion state [1/s].
+    limits : Lowest and highest [1/s].
+    speed, depth : U [m/s] and D0 [m] of that state.
+
+    Raises
+    ------
+    NoEquilibrium
+        When they are beyond the limits.
+    """
+    low, high = limits
     if not low <= needed <= high:
-        at = f"{case.initial.speed_mps:.4g} m/s and D0 = {case.initial.depth_m:.4g} m"
-        limits = f"the propeller's limits are {low:g} to {high:g} 1/s"
-        raise NoEquilibrium(f"self-propulsion at {at} needs {needed:.4g} 1/s; {limits}")
+        at = f"{speed:.4g} m/s and D0 = {depth:.4g} m"
+        said = f"the propeller's limits are {low:g} to {high:g} 1/s"
+        raise NoEquilibrium(f"self-propulsion at {at} needs {needed:.4g} 1/s; {said}")
 
 
 def check_steepness(case: Case, height: float, length: float) -> None:
