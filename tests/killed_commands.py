@@ -44,7 +44,7 @@ COMMANDS = (
     ("diff", "0", "1", "--db", "{here}/db", "--json", "{out}/diff.json"),
     ("report", "--db", "{here}/flown", "--out", "{out}"),
     ("validate", "--case", "roll-decay", "--db", "{here}/flown", "--out", "{out}", "--json", "{out}/v.json"),
-    ("fly", "hzz20", "{out}/flight.csv", "--db", "{here}/flown"),
+    ("fly", "--case", "hzz20", "--out", "{out}/flight.csv", "--db", "{here}/flown"),
     ("stability", "--db", "{here}/flown", "--json", "{out}/s.json"),
     ("animate", "--case", "roll-decay", "--db", "{here}/flown", "--out", "{out}/a.gif"),
     ("doctor", "--db", "{here}/db", "--repair"),
