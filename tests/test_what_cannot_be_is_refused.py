@@ -11,6 +11,7 @@ from importlib.resources import files
 import pytest
 from click.testing import CliRunner
 
+import ident
 from ident.calibration.file import load_calibration, parameters
 from ident.cli import main
 from ident.trials.maneuvers import stated
@@ -275,6 +276,15 @@ def test_an_empty_name_of_a_case_is_no_case(tmp_path, fitted_db):
     done = run("validate", "--case", "", "--db", fitted_db, "--out", tmp_path / "out")
     assert (done.exit_code, "empty" in done.output) == (2, True)
     assert not (tmp_path / "out").exists()
+
+
+def test_an_empty_name_of_a_vehicle_is_not_that_of_the_case(tmp_path, fitted_db):
+    into = ("--vehicle", "", "--db", fitted_db, "--out", tmp_path / "out")
+    for command in (("validate", "--case", "hzz20"), ("fly", "--case", "hzz20"), ("report",)):
+        done = run(*command, *into)
+        assert (done.exit_code, "no such file or bundled name" in done.output) == (2, True)
+    with pytest.raises(InputError, match="posterior"):
+        ident.calibrate("bb2", fitted_db, diagnostics=ident.Diagnostics(posterior=10**12))
 
 
 def test_speeds_that_overflow_are_refused(fitted_db):

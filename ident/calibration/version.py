@@ -49,6 +49,9 @@ _UNLEARNT = 0.9
 # A multiplier that moves by more of its standard deviations without one source is said.
 _SHIFTED = 2.0
 
+# Draws of a posterior, or of a design: more would fill the memory, and fly for weeks.
+_MOST_DRAWS = 10_000_000
+
 
 def captive_version(db: str, vehicle: str, number: int | None) -> Version:
     """The version to start from: the one asked for, or the latest that no maneuver trained.
@@ -342,6 +345,10 @@ def _refuse_idle(diagnostics: Diagnostics, work: Work) -> None:
         raise InputError(
             "calibrate, work.dask", repr(work.dask), "workers: a calibration runs in threads of one machine"
         )
+    for name, count in (("posterior", diagnostics.posterior), ("sensitivity", diagnostics.sensitivity)):
+        if count > _MOST_DRAWS:
+            text = f"{_MOST_DRAWS:,} at most: each flies every training case"
+            raise InputError(f"calibrate, diagnostics.{name}", f"{count:,}", text)
     if diagnostics.seed is not None and not (diagnostics.posterior or diagnostics.sensitivity):
         raise InputError("calibrate, diagnostics.seed", f"{diagnostics.seed}", "with posterior or sensitivity")
 

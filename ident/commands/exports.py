@@ -101,7 +101,7 @@ def _flown(
 
     (check_folder if kind == "c" else check_file)(path)
     case, where = load_case(name)
-    vehicle = load_vehicle(vehicle_name) if vehicle_name else load_vehicle(case.vehicle, beside=where)
+    vehicle = load_vehicle(vehicle_name) if vehicle_name is not None else load_vehicle(case.vehicle, beside=where)
     boat = Fleet(db, version).boat(vehicle)
     with equilibrium_of(on_screen(name)):
         if kind == "daveml":

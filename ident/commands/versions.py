@@ -57,7 +57,7 @@ def report(
 
     console = console_for(quiet=json_path == "-")
     done = []
-    for name in [vehicle] if vehicle else reported_vehicles(db, version):
+    for name in [vehicle] if vehicle is not None else reported_vehicles(db, version):
         with console.status(f"drawing every coefficient of {on_screen(name)}"):
             done.append(write_report(db, version, out, name, interactive, beside, 0, scoreboard))
         console.print(f"report: {on_screen(done[-1]['file'])}", highlight=False)

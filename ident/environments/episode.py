@@ -93,7 +93,7 @@ def episode(case: str | os.PathLike[str], options: Options) -> Episode:
     db, version, vehicle = asked.pop("db", "coeff_db"), asked.pop("version", None), asked.pop("vehicle", None)
     period, duration, spread = asked.pop("period", None), asked.pop("duration", None), asked.pop("spread", 0.0)
     data, where = load_case(os.fspath(case))
-    boat = load_vehicle(vehicle) if vehicle else load_vehicle(data.vehicle, beside=where)
+    boat = load_vehicle(vehicle) if vehicle is not None else load_vehicle(data.vehicle, beside=where)
     return Episode(
         case=data,
         coefficients=Coefficients(boat, read_rows(os.fspath(db), version, boat.name)[0]),

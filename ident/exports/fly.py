@@ -99,7 +99,7 @@ def fly_to_file(
     """
     case, where = load_case(name)
     case = sampled(case, every)
-    vehicle = load_vehicle(vehicle_name) if vehicle_name else load_vehicle(case.vehicle, beside=where)
+    vehicle = load_vehicle(vehicle_name) if vehicle_name is not None else load_vehicle(case.vehicle, beside=where)
     boat = Fleet(db, version).boat(vehicle)
     database = {"path": db, "version": boat.commit.number, "digest": boat.commit.digest}
     path = out or Path(f"{case.name}_v{database['version']}{'.nc' if draws else '.csv'}")

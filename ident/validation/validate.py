@@ -290,7 +290,7 @@ def _held_against(
 ) -> tuple[Referenced, Vehicle, str, list[str]]:
     """The case with its references as it is to be flown, by which vehicle, the case's place, and notes."""
     flown, where = load_case(os.fspath(case))
-    ship = load_vehicle(os.fspath(vehicle)) if vehicle else load_vehicle(flown.vehicle, beside=where)
+    ship = load_vehicle(os.fspath(vehicle)) if vehicle is not None else load_vehicle(flown.vehicle, beside=where)
     flown, notes = for_boat(flown, where, ship, conditions)
     if reference is not None:
         stated = reference if isinstance(reference, OwnReference) else OwnReference(reference)
