@@ -145,6 +145,8 @@ def test_a_share_of_thrust_or_speed_that_no_hull_takes_is_not_flown(rows, coeffi
     [("mixer = { dV = -1, dH = 0 }", "mixer = { dV = 1, dH = 0 }", "mixer.dV"),
      ("mixer = { dV = 0, dH = -1 }", "mixer = { dV = 0, dH = 1 }", "mixer.dH"),
      ("mixer = { dV = 0, dH = -1 }", "mixer = { dV = 0.5, dH = -1 }", "rudders, mixer.dV"),
+     ("mixer = { dV = 0, dH = -1 }", "mixer = { dV = 0, dH = -10 }", "10 of the command"),
+     ("mixer = { dV = 0, dH = -1 }", "mixer = { dV = 0, dH = -0.001 }", "0.001 of the command"),
      ("[0.0, 0.0, 0.25]", "[0.25, 0.0, 0.0]", "a trim of 90 deg"),
      ("[0.0, 0.0, 0.25]", "[0.0, 0.0, -0.25]", "above the centre of buoyancy")],
 )  # fmt: skip

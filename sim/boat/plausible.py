@@ -37,6 +37,8 @@ _ABOVE = 0.05
 _MOTIONS = ("surge", "sway", "heave", "roll", "pitch", "yaw")
 # Floating boats displace what they weigh; a submerged one differs by what its planes can carry.
 _OUT_OF_TRIM = 0.5
+# Of a command, on the plane that takes most: less would never turn it to its limit, more is a slip of a digit.
+_LARGEST_SHARE = (0.1, 2.0)
 # Port and starboard exchanged.
 _MIRROR = (1.0, -1.0, 1.0)
 # Two positions are each other's mirror image when they differ by less than this part of the length.
@@ -308,6 +310,10 @@ def _commands(vehicle: Any) -> Iterator[tuple[str, str, str]]:
             lift = frame.sign("xyz"[axis]) * float(plane.lift_axis[axis]) * (1.0 if name == "dH" else -1.0)
             turning += arm * lift * getattr(plane.mixer, name)
             shares = max(shares, abs(arm * lift * getattr(plane.mixer, name)))
+        most = max((abs(getattr(plane.mixer, name)) for plane in vehicle.planes), default=0.0)
+        if most and not _LARGEST_SHARE[0] <= most <= _LARGEST_SHARE[1]:
+            allowed = f"{_LARGEST_SHARE[0]:g} to {_LARGEST_SHARE[1]:g} of it on the plane that takes most"
+            yield f"planes, mixer.{name}", f"{most:g} of the command at most", allowed
         if turning < -_SAME * shares:
             found = f"shares of {name} that do the opposite together"
             yield (
