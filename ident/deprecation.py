@@ -6,7 +6,7 @@ import dataclasses
 import functools
 import inspect
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, ParamSpec, TypeVar
 
 P = ParamSpec("P")
@@ -46,7 +46,10 @@ def deprecated(since: str, instead: str) -> Callable[[Callable[P, R]], Callable[
 
 
 def gathered(
-    since: str, kinds: Mapping[str, type[Any]], **into: str | tuple[str, str, Callable[[Any], Any] | None]
+    since: str,
+    kinds: Mapping[str, type[Any]],
+    places: Sequence[str] = (),
+    **into: str | tuple[str, str, Callable[[Any], Any] | None],
 ) -> Callable[[Callable[P, R]], Callable[P, R]]:
     """Go on to take keywords that now are fields of an option class, with a warning.
 
@@ -54,6 +57,7 @@ def gathered(
     ----------
     since : Version that announced it.
     kinds : Parameter -> its frozen dataclass. A value that is none is taken for the first field of it.
+    places : What could follow by its place, before only its name was taken; in that order.
     **into : Keyword -> parameter that has a field of that name; or parameter, field, and what makes one of the other.
 
     Examples
@@ -72,10 +76,21 @@ def gathered(
     """
 
     def mark(function: Callable[P, R]) -> Callable[P, R]:
-        usual = {name: p.default for name, p in inspect.signature(function).parameters.items()}
+        parameters = inspect.signature(function).parameters
+        usual = {name: p.default for name, p in parameters.items()}
+        go_on: Callable[..., R] = function
+        by_place = sum(p.kind is p.POSITIONAL_OR_KEYWORD for p in parameters.values())
 
         @functools.wraps(function)
         def taken(*arguments: P.args, **named: P.kwargs) -> R:
+            first, further = arguments[:by_place], arguments[by_place:]
+            if len(further) > len(places) or set(places[: len(further)]) & set(named):
+                return function(*arguments, **named)
+            if further:
+                said = ", ".join(places[: len(further)])
+                text = f"{function.__name__}(..., {said}) by place is deprecated since ident {since}: give names"
+                warnings.warn(text, DeprecationWarning, stacklevel=2)
+                named.update(zip(places, further, strict=False))
             for old in [name for name in named if name in into]:
                 where = into[old]
                 parameter, field, made = (where, old, None) if isinstance(where, str) else where
@@ -86,7 +101,7 @@ def gathered(
                 now = named.get(parameter, usual[parameter])
                 now = now if isinstance(now, kind) else kind(now)
                 named[parameter] = dataclasses.replace(now, **{field: made(value) if made else value})
-            return function(*arguments, **named)
+            return go_on(*first, **named)
 
         return taken
 

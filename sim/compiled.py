@@ -84,14 +84,14 @@ class _Cache(FunctionCache):
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """A kept function; a damaged file is thrown away, and compiled again."""
         try:
-            found = super().load_overload(sig, target_context)
+            kept = super().load_overload(sig, target_context)
         except Exception:
             # Truncated, foreign or unreadable: whatever a damaged pickle raises.
             self._throw_away()
-            found = None
-        if found is None:
+            kept = None
+        if kept is None:
             _announce(self._py_func, sig, "once per installation")
-        return found
+        return kept
 
     def save_overload(self, sig: Any, data: Any) -> None:
         """Keep a function; without room for it nothing is kept."""

@@ -49,14 +49,14 @@ def compiled_sources(folder: Path) -> list[Path]:
         for path in folder.rglob("*.py")
     }
     todo = [n for n, source in text.items() if any(m in source for m in _MARKS) and not n.startswith("bench.")]
-    found: set[str] = set()
+    compiled: set[str] = set()
     while todo:
         name = todo.pop()
-        if name in text and name not in found:
-            found.add(name)
+        if name in text and name not in compiled:
+            compiled.add(name)
             for module, names in _IMPORTS.findall(text[name]):
                 todo += [module[1:], *(f"{module[1:]}.{word}" for word in re.split(r"\W+", names))]
-    return [folder.joinpath(*name.split(".")).with_suffix(".py") for name in sorted(found)]
+    return [folder.joinpath(*name.split(".")).with_suffix(".py") for name in sorted(compiled)]
 
 
 def sources_key(folder: Path) -> str:
@@ -77,11 +77,11 @@ def is_ours(path: Path) -> bool:
     if not hasattr(os, "geteuid"):
         return True
     try:
-        found = os.lstat(path)
+        state = os.lstat(path)
     except OSError:
         return False
-    kind = stat.S_ISDIR(found.st_mode) or stat.S_ISREG(found.st_mode)
-    return kind and found.st_uid == os.geteuid() and not found.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
+    kind = stat.S_ISDIR(state.st_mode) or stat.S_ISREG(state.st_mode)
+    return kind and state.st_uid == os.geteuid() and not state.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
 
 
 def _candidates(folder: Path) -> Iterator[Path]:

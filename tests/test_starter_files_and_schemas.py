@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import re
 import tomllib
 from importlib.resources import files
 from pathlib import Path
@@ -157,52 +156,3 @@ def test_one_version_everywhere():
         text = (ROOT / name).read_text("utf-8")
         assert cited in text, name
         assert "Kim, D." not in text
-
-
-def test_what_a_contributor_is_told_to_run_is_there():
-    text = (ROOT / "CONTRIBUTING.md").read_text("utf-8")
-    named = re.findall(r"`((?:sim|ident|tests|docs|\.ci)/[\w./]+\w)`", text)
-    assert len(named) >= 10
-    for path in named:
-        assert (ROOT / path).exists() or "NAME" in path, path
-    for path in re.findall(r"(?:pytest (?:-n 0 )?|python )((?:tests|docs)/\S+\.py)", text):
-        assert (ROOT / path).is_file(), path
-    extras = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]["optional-dependencies"]
-    dev = " ".join(extras["dev"] + extras["docs"])
-    for tool in ("ruff", "mypy", "import-linter", "sphinx"):
-        assert tool in dev
-
-
-def test_former_keywords_of_the_public_functions_go_on_and_say_what_to_use():
-    from ident.deprecation import gathered
-    from ident.options import Conditions, OwnReference
-
-    @gathered("0.2", {"at": Conditions, "record": OwnReference}, speed=("at", "speed_mps", None), frame="record")
-    def fly(at=Conditions(), record=None):  # noqa: B008
-        return at, record
-
-    with pytest.warns(
-        DeprecationWarning, match=r"fly\(speed=...\) .* 0.2: use at=Conditions\(speed_mps=...\)"
-    ) as caught:
-        assert fly(speed=2.0) == (Conditions(speed_mps=2.0), None)
-    assert caught[0].filename == __file__
-    with pytest.warns(DeprecationWarning, match="use record=OwnReference"):
-        assert fly(record="a.csv", frame="program")[1] == OwnReference("a.csv", frame="program")
-    with pytest.warns(DeprecationWarning, match="work=Work"), pytest.raises(ident.InputError, match="not a folder"):
-        ident.fit("nowhere", wait=1.0)
-    with pytest.raises(TypeError, match="wheight"):
-        fly(wheight=2.0)
-
-
-def test_what_is_deprecated_says_since_when_and_what_instead():
-    from ident.deprecation import deprecated
-
-    @deprecated("0.3", "new()")
-    def old(x, *, y=1):
-        """Of old."""
-        return x + y
-
-    with pytest.warns(DeprecationWarning, match=r"old is deprecated since ident 0.3: use new\(\)") as caught:
-        assert old(1, y=2) == 3
-    assert caught[0].filename == __file__
-    assert (old.__name__, old.__doc__) == ("old", "Of old.")

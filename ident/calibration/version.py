@@ -270,6 +270,7 @@ def _told(each: Callable[[str], None]) -> Tell:
 @gathered(
     "0.2",
     {"work": Work, "diagnostics": Diagnostics},
+    ("workers", "each", "wait", "posterior", "sensitivity", "seed"),
     wait="work",
     workers="work",
     each=("work", "tell", _told),

@@ -166,7 +166,14 @@ def metadata(
     )
 
 
-@gathered("0.2", {"work": Work}, wait="work", tell="work", dask="work")
+@gathered(
+    "0.2",
+    {"work": Work},
+    ("wait", "tell", "measured_only", "without", "dask"),
+    wait="work",
+    tell="work",
+    dask="work",
+)
 def fit(
     folder: str | os.PathLike[str],
     db: str | os.PathLike[str] = "coeff_db",

@@ -174,13 +174,13 @@ def candidate_runs(campaign: Campaign, facility: Facility) -> pd.DataFrame:
     """
     levels = campaign_levels(campaign)
     for test in levels:
-        own = getattr(facility, test)
-        levels[test] = own if own is not None else levels[test]
+        stated = getattr(facility, test)
+        levels[test] = stated if stated is not None else levels[test]
     rows = [dict(zip(("test", "part", "why"), key, strict=True)) | state for key, state in _states(campaign, levels)]
     rows = [r for r in rows if r["test"] not in facility.exclude]
     table = run_table({c: [r.get(c, math.nan) for r in rows] for c in ("test", "part", "why", *STATES)})
-    own = campaign.runs
-    again = own[~own["test"].isin([*_NOT_PLANNED, *facility.exclude]) & (own["copy_of"] == "")]
+    measured = campaign.runs
+    again = measured[~measured["test"].isin([*_NOT_PLANNED, *facility.exclude]) & (measured["copy_of"] == "")]
     again = again[["test", "part", *STATES]].drop_duplicates().assign(why="value")
     table = pd.concat([table, again], ignore_index=True)
     table = run_table({c: table[c] for c in ("test", "part", "why", *STATES)})

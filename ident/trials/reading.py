@@ -171,8 +171,8 @@ def _units_passed(path: Path, source: Source, sheet: Sheet, first_row: int) -> t
         return None
     lines = head(path, source.encoding, (), source.skip)
     above = [(row, text.split()) for row, text in zip(lines.rows, lines.text, strict=True) if row < first_row]
-    found = ((row, _with_units(sheet, cells)) for row, cells in reversed(above))
-    return next(((row, header) for row, header in found if header and any(h.endswith("]") for h in header)), None)
+    headers = ((row, _with_units(sheet, cells)) for row, cells in reversed(above))
+    return next(((row, header) for row, header in headers if header and any(h.endswith("]") for h in header)), None)
 
 
 def read_recording(path: Path, spec: TrialFile) -> Recording:

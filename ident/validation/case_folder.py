@@ -44,6 +44,6 @@ def in_folder(folder: Path) -> tuple[list[str], dict[str, str]]:
     others = {name: kind for name, kind in kinds.items() if kind != "case"}
     if not cases:
         beside = ", ".join(f"{Path(name).name} (a {kind})" for name, kind in others.items())
-        found = f"no case file beside {beside}" if others else "no case file"
-        raise InputError(str(folder), found, "a folder with case files (*.toml)")
+        seen = f"no case file beside {beside}" if others else "no case file"
+        raise InputError(str(folder), seen, "a folder with case files (*.toml)")
     return cases, others

@@ -114,9 +114,9 @@ def rhs(m: Model, y: Array, c: Array) -> Array:
         moment = m.mass * np.array([shift, 0.0, 0.0]) + ballast * tank
         lever = cross_matrix(tank)
         inertia = inertia - ballast * lever @ lever
-        own = cross_matrix(moment)
+        coupling = cross_matrix(moment)
         inverse = np.linalg.inv(
-            m.mass_matrix + np.block([[ballast * np.eye(3), -own], [own, -ballast * lever @ lever]])
+            m.mass_matrix + np.block([[ballast * np.eye(3), -coupling], [coupling, -ballast * lever @ lever]])
         )
         mass += ballast
         r_g, weight = (m.mass * r_g + moment) / mass, weight * mass / m.mass

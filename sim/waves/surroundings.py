@@ -36,10 +36,10 @@ Whole = NDArray[np.int64]
 # not known; the span of the sums [s]; highest elevation that can come [m]; rho g [N/m^3]; volume
 # [m^3] and its emerged share; decay, least depth and speed step of the mean loads; box around the boat
 # and around its cells, corners [m]; state with velocities relative to the water; load of emergence; added
-# mass of the left-hand side and of the wet part. Then the quantities found, and more by ``AT``.
-START, NOW, FOUND_AT, SPAN_START, SPAN_END, CREST, SPECIFIC_WEIGHT, VOLUME, EMERGED = range(9)
+# mass of the left-hand side and of the wet part. Then the values of the quantities, and more by ``AT``.
+START, NOW, VALUES_AT, SPAN_START, SPAN_END, CREST, SPECIFIC_WEIGHT, VOLUME, EMERGED = range(9)
 DECAY, LEAST, SPEED_STEP = 9, 10, 11
-BOX, CELL_BOX, FELT, LOST, ADDED, WET, FOUND = 12, 18, 24, 36, 42, 78, 114
+BOX, CELL_BOX, FELT, LOST, ADDED, WET, VALUES = 12, 18, 24, 36, 42, 78, 114
 # Whole numbers: whether there are waves and mean loads; how many quantities, those of them that are always
 # wanted, stations, cells and sections; speeds, headings and depths of the mean loads; where the rest stands.
 WAVES, DRIFT, WIDTH, WANTED, N_STATIONS, N_CELLS, N_SECTIONS = range(7)
@@ -89,7 +89,7 @@ def surroundings_of(
     floats, places = flat_cells(cells)
     width = sums.value.shape[1]
     pieces = (sums.value, sums.slope, floats, drift.loads, parts, volume, np.zeros(count))
-    ends = FOUND + width + np.cumsum([0, *(p.size for p in pieces)])
+    ends = VALUES + width + np.cumsum([0, *(p.size for p in pieces)])
     a, b = np.zeros(ends[-1]), np.zeros(PLACES, dtype=np.int64)
     for start, piece in zip(ends[:-1], pieces, strict=True):
         a[start : start + piece.size] = piece.ravel()
@@ -98,7 +98,7 @@ def surroundings_of(
     value, slope = (a[at : at + 2 * width].reshape(2, width) for at in ends[:2])
     sums = sums._replace(time=a[SPAN_START : SPAN_END + 1], value=value, slope=slope)
     sums.time[:] = 0.0, -1.0
-    a[FOUND_AT], a[CREST], a[SPECIFIC_WEIGHT] = -1.0, sea.crest, specific_weight
+    a[VALUES_AT], a[CREST], a[SPECIFIC_WEIGHT] = -1.0, sea.crest, specific_weight
     a[VOLUME] = float(sum(cells.volumes))
     a[DECAY], a[LEAST], a[SPEED_STEP] = drift.decay, drift.least, drift.speed_step
     a[BOX : BOX + 6], a[CELL_BOX : CELL_BOX + 6] = sea.box.ravel(), np.concatenate([cells.low, cells.high])
@@ -128,10 +128,10 @@ def _wet_added_mass(a: Array, b: Whole, share: float) -> None:
 def _emerge(a: Array, b: Whole, y: Array) -> float:
     """Emerged share of the volume; load and added mass of what is left into ``a``."""
     width, stations = b[WIDTH], b[N_STATIONS]
-    first, surface, lowest = width - stations, FOUND + width - stations, 0.0
+    first, surface, lowest = width - stations, VALUES + width - stations, 0.0
     if b[WAVES]:
         span = (a[SPAN_START], a[SPAN_END])
-        blend(a, span[0], span[1], b[AT_VALUE], b[AT_SLOPE], width, a[NOW], first, width, a, FOUND)
+        blend(a, span[0], span[1], b[AT_VALUE], b[AT_SLOPE], width, a[NOW], first, width, a, VALUES)
     for i in range(stations):
         lowest = min(lowest, a[surface + i])
     st, ct = sin(y[10]), cos(y[10])
@@ -154,7 +154,7 @@ def prepare(around: Around, y: Array, time: float) -> None:
     # Sums that still cover the time are left alone here: handing them over takes as long as a step.
     covered = a[SPAN_START] <= time < a[SPAN_END] - 1e-9 * (a[SPAN_END] - a[SPAN_START])
     if around.near.b[WAVES] and not covered:
-        a[FOUND_AT] = -1.0
+        a[VALUES_AT] = -1.0
         wave_passage.advance(around.sea, y, time, around.sums)
 
 
@@ -189,12 +189,12 @@ def observe(near: Around, y: Array) -> None:
         a[FELT + i] = y[i]
     if b[WAVES]:
         # Two stages of a step are at the same time, and the next step begins where one ends.
-        if abs(a[FOUND_AT] - a[NOW]) > _SAME_TIME:
+        if abs(a[VALUES_AT] - a[NOW]) > _SAME_TIME:
             span = (a[SPAN_START], a[SPAN_END])
-            blend(a, span[0], span[1], b[AT_VALUE], b[AT_SLOPE], b[WIDTH], a[NOW], 0, b[WANTED], a, FOUND)
-            a[FOUND_AT] = a[NOW]
+            blend(a, span[0], span[1], b[AT_VALUE], b[AT_SLOPE], b[WIDTH], a[NOW], 0, b[WANTED], a, VALUES)
+            a[VALUES_AT] = a[NOW]
         for i in range(6):
-            a[FELT + i] -= a[FOUND + WATER + i]
+            a[FELT + i] -= a[VALUES + WATER + i]
 
 
 def relative(near: Around, y: Array) -> tuple[Array, int]:
@@ -206,13 +206,13 @@ def plane_inflow(near: Around, plane: int) -> tuple[float, float, float]:
     """Velocity of the water at a plane, body axes [m/s], after ``observe``."""
     if not near.b[WAVES]:
         return 0.0, 0.0, 0.0
-    k = FOUND + PROBES + 3 * plane
+    k = VALUES + PROBES + 3 * plane
     return near.a[k], near.a[k + 1], near.a[k + 2]
 
 
 def propeller_inflow(near: Around, planes: int) -> float:
     """Velocity of the water ahead at the propeller [m/s], after ``observe``."""
-    return near.a[FOUND + PROBES + 3 * planes] if near.b[WAVES] else 0.0
+    return near.a[VALUES + PROBES + 3 * planes] if near.b[WAVES] else 0.0
 
 
 def add_loads(near: Around, y: Array, out: Array) -> None:
@@ -233,9 +233,9 @@ def add_loads(near: Around, y: Array, out: Array) -> None:
             size = (b[SPEEDS], b[HEADINGS], b[DEPTHS])
             mean = mean_load(a, b[AT_DRIFT], size[0], size[1], size[2], a[DECAY], a[LEAST], a[SPEED_STEP], y)
         for i in range(6):
-            load = (1.0 - share) * (a[FOUND + FORCE + i] + mean[i])
+            load = (1.0 - share) * (a[VALUES + FORCE + i] + mean[i])
             for j in range(6):
-                load += a[mass + 6 * i + j] * a[FOUND + WATER_RATE + j]
+                load += a[mass + 6 * i + j] * a[VALUES + WATER_RATE + j]
             out[i] += load
 
 
