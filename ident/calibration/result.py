@@ -111,7 +111,7 @@ class MultiplierGroup:
 
     @classmethod
     def of(cls, stored: dict[str, Any]) -> MultiplierGroup:
-        """A group as a version's metadata holds it."""
+        """A group as the metadata of a version has it ``stored``."""
         alone = stored["maneuvers_alone"]
         parts = {"prior": Prior(**stored["prior"]), "posterior": Known(**stored["posterior"])}
         return cls(**stored | parts | {"maneuvers_alone": None if alone is None else Known(**alone)})

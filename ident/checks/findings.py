@@ -61,7 +61,7 @@ class Finding:
         return asdict(self) | {"rows": list(self.rows), "columns": list(self.columns)}
 
     def with_words(self, more: str) -> Finding:
-        """The same finding with words added to what was found."""
+        """The same finding with ``more`` words added to what was found."""
         return replace(self, what=self.what + more)
 
     @property

@@ -78,7 +78,7 @@ class Identification:
         return by_coefficient(self.nodes)
 
     def points(self, term: Term, part: str) -> tuple[list[Point], list[int], list[int]]:
-        """Measured and mirrored points of a coefficient, their node and sign."""
+        """Measured and mirrored points of the coefficient of a ``term`` on a ``part``, their node and sign."""
         return table_points(self.nodes, term, part, self.campaign.vehicle, self._members)
 
 

@@ -67,6 +67,7 @@ class Metric(Mapping[str, float | None]):
         return self.columns | (asdict(self.interval) if self.interval else {})
 
     def __getitem__(self, column: str) -> float | None:
+        """The value of a column of ``to_dict``."""
         return self.to_dict()[column]
 
     def __iter__(self) -> Iterator[str]:

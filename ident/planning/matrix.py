@@ -107,6 +107,10 @@ class Plan:
     def to_csv(self, path: str | os.PathLike[str]) -> None:
         """Write the test matrix as CSV.
 
+        Parameters
+        ----------
+        path : Of the file; one that is there is replaced.
+
         Raises
         ------
         InputError

@@ -108,7 +108,14 @@ class Bands:
         return np.asarray(value, dtype=np.float64)
 
     def band(self, channel: str, level: str, source: str = "") -> tuple[Array, Array]:
-        """Lower and upper edge of the 50 or 95 % band of a channel, as a source's record starts."""
+        """Lower and upper edge of a band, (rows,) each, SI and radians.
+
+        Parameters
+        ----------
+        channel : Of the flight.
+        level : ``50`` or ``95`` [%].
+        source : Whose record the flight starts as; the case's own start without one.
+        """
         key = (channel, source)
         if key not in self._edges:
             self._edges[key] = _percentiles(self.of(source)[channel])

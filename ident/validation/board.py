@@ -263,7 +263,7 @@ class Scoreboard:
         return max(WorstRatio(c.compared.error.ratio or 0.0, c.case.name, c.source, c.channel) for c in rated)
 
     def with_validations(self, done: list[Validation]) -> Scoreboard:
-        """The same board with other flights of its cases: those with error bands."""
+        """The same board with other flights of its cases, ``done`` with error bands."""
         by_name = {one.case.name: one for one in done}
         cases = [replace(case, validation=by_name.get(case.name, case.validation)) for case in self.cases]
         return replace(self, cases=tuple(cases))

@@ -167,7 +167,11 @@ class Plant:
         return self._work.real[OUTSIDE : OUTSIDE + 6]
 
     def __getitem__(self, channel: str) -> float:
-        """A state, a plane, n, ballast or trim_tank by name; ``t``, ``U`` and ``D0`` too.
+        """A channel as it is now, SI and radians.
+
+        Parameters
+        ----------
+        channel : A state, a plane, n, ballast or trim_tank; ``t``, ``U`` and ``D0`` too.
 
         Raises
         ------

@@ -40,6 +40,7 @@ class Series:
         return self.smooth.get(source, self[source])
 
     def __getitem__(self, source: str) -> dict[str, Record]:
+        """Channel -> record of a source; empty for one that has none."""
         return self.data.get(source, {})
 
 
