@@ -29,7 +29,7 @@ def test_a_version_comes_back_to_its_digest(fitted_db, tmp_path):
     assert said["digest"] == done["database"]["digest"] == ident.Database(other)[0].digest
     ours, theirs = read_rows(fitted_db)[0], read_rows(other)[0]
     assert ours.equals(theirs)
-    assert not import_exchange(tmp_path / "coefficients_v0.json", other, 10.0)[0]["new"]
+    assert not import_exchange(tmp_path / "coefficients_v0.json", other, 10.0)[0].new
 
 
 @pytest.mark.parametrize(

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import sys
+from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from ident.commands.shared import WAIT, console_for, emit, json_to
+
+if TYPE_CHECKING:
+    from ident.database.installation import Installation
 
 
 @click.command()
@@ -28,19 +32,19 @@ def doctor(folders: tuple[Path, ...], db: str | None, repair: bool, wait: float,
              ident doctor --db coeff_db
              ident doctor raw_captive_data/ --db coeff_db --repair
     """
-    from ident.database.installation import installation, self_test
+    from ident.database.installation import installation
     from sim.files.errors import InputError
 
     if db is None and (repair or folders):
         raise InputError("ident doctor", "--repair or a campaign without --db", "--db with the database to repair")
     quiet = json_path == "-"
     console = console_for(quiet=quiet)
-    report: dict[str, Any] = installation()
     with console.status("testing the installation"):
-        report["self_test"] = self_test()
-    well = not any(one["fault"] for one in report["self_test"])
+        installed = installation()
+    report = asdict(installed)
+    well = not any(one.fault for one in installed.self_test)
     if not quiet:
-        _show_installation(report, console)
+        _show_installation(installed, console)
     if db is not None:
         from ident.database.doctor import examine
         from ident.database.doctor import repair as restore
@@ -61,16 +65,15 @@ def doctor(folders: tuple[Path, ...], db: str | None, repair: bool, wait: float,
         sys.exit(1)
 
 
-def _show_installation(installed: dict[str, Any], console: Any) -> None:
-    packages = ", ".join(f"{name} {version}" for name, version in installed["packages"].items() if version)
-    threads = ", ".join(f"{name} {value}" for name, value in installed["threads"].items())
-    cache = installed["cache"]
+def _show_installation(installed: Installation, console: Any) -> None:
+    packages = ", ".join(f"{name} {version}" for name, version in installed.packages.items() if version)
+    threads = ", ".join(f"{name} {value}" for name, value in installed.threads.items())
     lines = (
-        f"{installed['program']}, Python {installed['python']}, {installed['machine']}",
+        f"{installed.program}, Python {installed.python}, {installed.machine}",
         f"packages: {packages}",
         f"threads: {threads}",
-        f"compiled functions: {cache['folder'] or 'no cache'} ({cache['bytes'] / 1e6:.1f} MB)",
-        *(f"self-test: {one['test']}: {one['fault'] or 'as it should be'}" for one in installed["self_test"]),
+        f"compiled functions: {installed.cache.folder or 'no cache'} ({installed.cache.bytes / 1e6:.1f} MB)",
+        *(f"self-test: {one.test}: {one.fault or 'as it should be'}" for one in installed.self_test),
     )
     for line in lines:
         console.print(line, highlight=False, markup=False)

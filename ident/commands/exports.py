@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -143,7 +144,7 @@ def import_(path: Path, db: str, wait: float, json_path: str | None) -> None:
     done = import_exchange(path, db, wait)
     if json_path != "-":
         for one in done:
-            said = f"version {one['version']}" if one["new"] else f"the same as version {one['version']}"
-            click.echo(f"{visible(one['vehicle'])}: {said}, {one['rows']} rows, digest {one['digest'][:16]}")
+            said = f"version {one.version}" if one.new else f"the same as version {one.version}"
+            click.echo(f"{visible(one.vehicle)}: {said}, {one.rows} rows, digest {one.digest[:16]}")
     if json_path:
-        emit({"database": db, "vehicles": done}, json_path)
+        emit({"database": db, "vehicles": [asdict(one) for one in done]}, json_path)

@@ -6,9 +6,9 @@ import os
 import platform
 import sys
 import tempfile
+from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
-from typing import Any
 
 from ident import __version__
 
@@ -32,15 +32,46 @@ _PACKAGES = (
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 
 
-def installation() -> dict[str, Any]:
+@dataclass(frozen=True)
+class Installation:
     """Versions, threads and caches.
 
-    Returns
-    -------
-    ``program``, ``python``, ``machine``, ``packages`` (name -> version, empty when absent),
-    ``threads`` (cores, and what limits them), ``cache`` (folder of compiled functions and its
-    size in bytes).
+    Attributes
+    ----------
+    program, python, machine : Names with versions.
+    packages : Name -> version, empty when absent.
+    threads : ``cores``, and the variables that limit them.
+    cache : ``folder`` of compiled functions and its size, ``bytes``.
+    self_test : One entry a test, as ``self_test``.
     """
+
+    program: str
+    python: str
+    machine: str
+    packages: dict[str, str]
+    threads: dict[str, int | str]
+    cache: Cache
+    self_test: list[SelfTest]
+
+
+@dataclass(frozen=True)
+class Cache:
+    """Where compiled functions are kept: folder, empty without one, and its size in bytes."""
+
+    folder: str
+    bytes: int
+
+
+@dataclass(frozen=True)
+class SelfTest:
+    """A test of the installation and its fault, empty when it passed."""
+
+    test: str
+    fault: str
+
+
+def installation() -> Installation:
+    """What the program runs on, tested."""
     packages = {}
     for name in _PACKAGES:
         try:
@@ -51,31 +82,27 @@ def installation() -> dict[str, Any]:
 
     cache = os.environ.get("NUMBA_CACHE_DIR", "")
     size = sum(p.stat().st_size for p in Path(cache).rglob("*") if p.is_file()) if cache else 0
-    return {
-        "program": f"ident {__version__}",
-        "python": sys.version.split()[0],
-        "machine": f"{platform.system()} {platform.machine()}",
-        "packages": packages,
-        "threads": {"cores": os.cpu_count() or 1} | {k: os.environ[k] for k in _THREADS if k in os.environ},
-        "cache": {"folder": cache, "bytes": size},
-    }
+    return Installation(
+        program=f"ident {__version__}",
+        python=sys.version.split()[0],
+        machine=f"{platform.system()} {platform.machine()}",
+        packages=packages,
+        threads={"cores": os.cpu_count() or 1, **{k: os.environ[k] for k in _THREADS if k in os.environ}},
+        cache=Cache(cache, size),
+        self_test=self_test(),
+    )
 
 
-def self_test() -> list[dict[str, str]]:
-    """Bundled boats loaded, and rows committed to a database in a temporary folder and read back.
-
-    Returns
-    -------
-    One entry a test: ``test`` and ``fault``, empty when it passed.
-    """
+def self_test() -> list[SelfTest]:
+    """Bundled boats loaded, and rows committed to a database in a temporary folder and read back."""
     results = []
     for name, test in (("bundled vehicles", _vehicles), ("a database, written and read back", _database)):
         try:
             test()
-            results.append({"test": name, "fault": ""})
+            results.append(SelfTest(name, ""))
         except Exception as error:
             # Whatever goes wrong is what this is for.
-            results.append({"test": name, "fault": f"{type(error).__name__}: {error}"})
+            results.append(SelfTest(name, f"{type(error).__name__}: {error}"))
     return results
 
 

@@ -7,6 +7,7 @@ stand in the rows), and what the commit says of itself. The files of a run table
 from __future__ import annotations
 
 import json
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -122,7 +123,25 @@ def _plain(value: Any) -> Any:
     return value.item() if hasattr(value, "item") else value
 
 
-def import_exchange(path: Path, db: str, wait: float) -> list[dict[str, Any]]:
+@dataclass(frozen=True)
+class Imported:
+    """A vehicle that was committed from an exchange file.
+
+    Attributes
+    ----------
+    vehicle : Its name.
+    version, digest, rows : What was committed.
+    new : Whether the database did not have it.
+    """
+
+    vehicle: str
+    version: int
+    digest: str
+    rows: int
+    new: bool
+
+
+def import_exchange(path: Path, db: str, wait: float) -> list[Imported]:
     """Commit what an exchange file holds, a version a vehicle.
 
     Parameters
@@ -133,7 +152,7 @@ def import_exchange(path: Path, db: str, wait: float) -> list[dict[str, Any]]:
 
     Returns
     -------
-    For each vehicle its name, ``version``, ``digest``, ``rows``, and whether it is ``new`` to the database.
+    One entry a vehicle.
 
     Raises
     ------
@@ -145,7 +164,7 @@ def import_exchange(path: Path, db: str, wait: float) -> list[dict[str, Any]]:
     done = []
     for (name, wanted, metadata), rows in read:
         number, new = commit(db, rows, metadata, wait)
-        done.append({"vehicle": name, "version": number, "digest": wanted, "rows": len(rows), "new": new})
+        done.append(Imported(name, number, wanted, len(rows), new))
     return done
 
 

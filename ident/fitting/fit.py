@@ -6,7 +6,6 @@ import json
 import logging
 import math
 import os
-from collections import Counter
 from collections.abc import Collection
 from dataclasses import asdict, astuple, dataclass
 from pathlib import Path
@@ -22,6 +21,7 @@ from ident.database.store import commit, database_rows, digest, no_rows
 from ident.deprecation import gathered
 from ident.estimates.predict import Estimated, predicted
 from ident.estimates.turning import Given, Shared
+from ident.fitting.coefficients import coefficient_summaries
 from ident.fitting.summary import summary
 from ident.identification.identify import Identification, identify
 from ident.options import Work
@@ -74,7 +74,7 @@ class Fit:
         """One row a coefficient: points, measured, runs, estimated, median relative error, worst residual, quality."""
         import pandas as pd
 
-        return pd.DataFrame(coefficient_table(self.rows)).set_index("coefficient")
+        return pd.DataFrame([asdict(one) for one in coefficient_summaries(self.rows)]).set_index("coefficient")
 
     def to_dict(self) -> dict[str, Any]:
         """The fit for a program to read."""
@@ -88,7 +88,7 @@ class Fit:
             "conversions": conversions(self.campaign),
             "measured_only": not self.estimates,
             "estimates": [vars(e) for e in self.estimates],
-            "coefficients": coefficient_table(self.rows),
+            "coefficients": [asdict(one) for one in coefficient_summaries(self.rows)],
             "unused": [one.to_dict() for one in self.identification.unused],
             "warnings": [one.to_dict() for one in self.identification.warnings],
             "checks": [f.as_json() for f in self.findings],
@@ -290,34 +290,6 @@ def _measured(campaign: Campaign, identified: Identification, measured_only: boo
     return no_rows() if campaign.runs.empty and not measured_only else database_rows(identified)
 
 
-def _relative_error(rows: pd.DataFrame) -> float | None:
-    """Median of standard errors over values that are not zero; None without such a value."""
-    some = rows[rows["value"] != 0.0]
-    return None if some.empty else float((some["stderr"] / some["value"].abs()).median())
-
-
-def coefficient_table(rows: pd.DataFrame) -> list[dict[str, Any]]:
-    """One row a coefficient: points, runs, worst disagreement, points by quality."""
-    table = []
-    for name, group in rows.groupby("coefficient", sort=False):
-        from_runs = group[group["origin"].isin(["measured", "published"])]
-        counted = from_runs if not from_runs.empty else group
-        counted = counted[counted["value"] != 0.0]
-        table.append(
-            {
-                "coefficient": str(name),
-                "points": len(group),
-                "measured": len(from_runs),
-                "runs": len({r for text in group["runs"] for r in text.split()}),
-                "estimated": int(group["estimated_by"].ne("").sum()),
-                "median_relative_error": _relative_error(counted),
-                "worst_residual": float(group["worst_residual"].max()),
-                "quality": dict(Counter(q for q in counted["quality"] if q)),
-            }
-        )
-    return table
-
-
 def _estimates_line(estimates: list[Estimated]) -> str:
     """Which estimates stand beside the runs; why others do not is in the report."""
     applied = [one.name for one in estimates if one.applied]
@@ -336,7 +308,7 @@ def show(done: Fit, console: Console) -> None:
 
     state = "committed" if done.new else "unchanged, nothing committed: already"
     last = f"{state} version {done.version}  digest {done.digest[:16]}"
-    table = coefficient_table(done.rows)
+    table = coefficient_summaries(done.rows)
     for style, line in summary(done.identification, done.rows, done.findings, table, last, console.width):
         console.print(Text(on_screen(line), style=style), no_wrap=True, overflow="crop")
     if said := _estimates_line(done.estimates):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from ident.checks.summary import NARROW, counted, cut, lines
 from ident.fitting.notes import group_unused, group_warnings
@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from ident.checks.findings import Finding
+    from ident.fitting.coefficients import CoefficientSummary
     from ident.identification.identify import Identification
 
 # Lines of each part; together with the rest they fit a screen of 24.
@@ -24,7 +25,7 @@ def summary(
     identification: Identification,
     rows: pd.DataFrame,
     findings: Sequence[Finding],
-    table: list[dict[str, Any]],
+    table: list[CoefficientSummary],
     last: str,
     width: int,
 ) -> list[tuple[str, str]]:
@@ -57,17 +58,17 @@ def summary(
     return out
 
 
-def _known(table: list[dict[str, Any]]) -> list[str]:
+def _known(table: list[CoefficientSummary]) -> list[str]:
     """The coefficients that are known worst, and those whose runs disagree most."""
-    known = [r for r in table if math.isfinite(r["median_relative_error"] or math.nan)]
-    loose = sorted(known, key=lambda r: -r["median_relative_error"])[:_NAMES]
-    apart = sorted((r for r in table if r["worst_residual"] > 2.0), key=lambda r: -r["worst_residual"])[:_NAMES]
+    errors = {one.coefficient: one.median_relative_error or math.nan for one in table}
+    loose = sorted((name for name, error in errors.items() if math.isfinite(error)), key=lambda n: -errors[n])[:_NAMES]
+    apart = sorted((one for one in table if one.worst_residual > 2.0), key=lambda one: -one.worst_residual)[:_NAMES]
     said = []
     if loose:
-        named = ", ".join(f"{r['coefficient']} {100 * r['median_relative_error']:.0f} %" for r in loose)
+        named = ", ".join(f"{name} {100 * errors[name]:.0f} %" for name in loose)
         said.append(f"largest standard errors: {named}")
     if apart:
-        named = ", ".join(f"{r['coefficient']} {r['worst_residual']:.1f} s.e." for r in apart)
+        named = ", ".join(f"{one.coefficient} {one.worst_residual:.1f} s.e." for one in apart)
         said.append(f"runs that disagree most: {named}")
     return said
 

@@ -183,8 +183,9 @@ def _calibration(commit: Version, vehicle: Vehicle, number: int) -> dict[str, An
     if not stored:
         return None
     stamp = f"{vehicle.name}, database version {number}; program frame: {PROGRAM}"
-    groups = [g | {"verdict": MultiplierGroup.of(g).verdict} for g in stored["groups"]]
-    return stored | {"groups": groups, "figure": prior_and_posterior(stored, stamp)}
+    groups = [MultiplierGroup.of(one) for one in stored["groups"]]
+    said = [one | {"verdict": group.verdict} for one, group in zip(stored["groups"], groups, strict=True)]
+    return stored | {"groups": said, "figure": prior_and_posterior(groups, stamp)}
 
 
 _ERRATA = ("equation", "printed", "corrected", "consequence")
