@@ -3,7 +3,9 @@
 Everything here runs without Python objects, on the arrays of ``sim.kernel.layout``. ``rhs`` and
 ``rk4`` take a ``Model`` and a ``Work``; ``fill_rate`` and ``step`` are what compiled loops call.
 Waves and a surface in reach are ``sim.waves.surroundings``; the compiler chooses by the type of
-``near``, so that a boat in deep, calm water is compiled without them.
+``near``, so that a boat in deep, calm water is compiled without them. ``_rate``, ``_features`` and
+``_loads`` are inlined where they are used; ``fill_rate``, ``fill_features`` and ``fill_loads`` are the
+same as entries that other compiled functions and Python may call.
 """
 
 from __future__ import annotations

@@ -74,6 +74,9 @@ def _multiply(w: np.ndarray, s: np.ndarray) -> None:
 def add_up_loads(m: np.ndarray, w: np.ndarray, s: np.ndarray, k: np.ndarray) -> None:
     """Hydrodynamic loads X Y Z K M N of the features in the scratch, into the scratch.
 
+    One loop for each number of axes up to three: the corners are a tuple of known length, for which ``add_rows`` is
+    one straight piece of vector code. The loop over corners, which would do for all, decides at every corner.
+
     Parameters
     ----------
     m, w : Model, floats and whole numbers. s, k : Scratch, likewise.
