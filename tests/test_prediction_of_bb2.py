@@ -64,6 +64,26 @@ def test_shared_errors_make_a_covariance_that_can_be_drawn(version):
     assert np.abs(matrix[np.ix_(plane, plane)]).min() > 0.3
 
 
+def test_what_a_plane_carries_undeflected_is_not_carried_over(rows, version):
+    """By definition the load on root and hull that a deflection makes vanishes without one."""
+    found = version[0].iloc[: len(rows)]
+    planes = rows["coefficient"].str.match("[XYZKMN]_d[1-4B]").to_numpy()
+    neutral = planes & rows["delta_deg"].eq(0.0).to_numpy()
+    assert neutral.sum() > 50
+    assert rows.loc[neutral, "value"].abs().max() > 1e-5
+    np.testing.assert_allclose(found.loc[neutral, "value"], rows.loc[neutral, "value"], rtol=1e-9)
+
+    def change(table):
+        at = table[(table["coefficient"] == "Z_d1") & (table["speed_mps"] == 5.14444) & (table["depth_m"] == 25.0)]
+        at = at.drop_duplicates("delta_deg").set_index("delta_deg")["value"]
+        return (at[[-10.0, 10.0]] - at[0.0]).to_numpy()
+
+    factor = change(found) / change(rows)
+    # Lift slope and carry-over are one factor of what deflection changes, to either side.
+    assert factor[0] == pytest.approx(factor[1], rel=1e-9)
+    assert factor[0] == pytest.approx(2.0, abs=0.05)
+
+
 def _loads(coefficients, environment, velocity, rates):
     model = assemble(coefficients, environment)
     work = workspace(model)

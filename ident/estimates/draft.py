@@ -99,12 +99,24 @@ class Draft:
 
     # -- what is done to them ----------------------------------------------------------------
 
-    def multiply(self, chosen: Mask, factor: float, sigma: float, unknown: str, word: str) -> None:
-        """Multiply values, their captive errors and their directions; the factor's error is shared."""
-        base = np.where(chosen, self.value, 0.0)
+    def multiply(
+        self, chosen: Mask, factor: float, sigma: float, unknown: str, word: str, kept: Array | None = None
+    ) -> None:
+        """Multiply values, their captive errors and their directions; the factor's error is shared.
+
+        Parameters
+        ----------
+        chosen : (n,) rows.
+        factor, sigma : The factor and its standard deviation.
+        unknown : Whose error the factor's is.
+        word : What the column ``estimated_by`` says.
+        kept : (n,) part of each value that the factor does not act on; none by default.
+        """
+        still = np.zeros(len(self.value)) if kept is None else kept
+        base = np.where(chosen, self.value - still, 0.0)
         for direction in self.directions.values():
             direction[chosen] *= factor
-        self.value[chosen] *= factor
+        self.value[chosen] = still[chosen] + factor * base[chosen]
         self.scale[chosen] *= factor
         self._move(unknown, base * sigma)
         self._say(chosen, word)

@@ -7,12 +7,15 @@ and the fins behind it. ``carry_over`` and ``downwash`` give the ratios; here th
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ident.estimates.carry_over import CarryOver, carry_over
 from ident.estimates.downwash import slopes, tail_downwash
-from ident.estimates.draft import Draft, NotApplicable
+from ident.estimates.draft import Draft, Mask, NotApplicable
 from sim.files.constants import constant
 from sim.files.errors import InputError
+
+Array = NDArray[np.float64]
 
 # Lift of a real surface on that of a lattice, and its deviation: the boundary layer takes some per cent of the
 # slope of a section, and lattices are as good as that at small aspect ratio.
@@ -59,8 +62,23 @@ def _planes(draft: Draft) -> CarryOver:
     return planes
 
 
+def at_neutral(draft: Draft, chosen: Mask) -> Array:
+    """(n,) load at zero deflection of the same plane, speed and depth; zero where no run has it.
+
+    What a plane carries undeflected is made by the flow about the hull and by friction. Roots and hull carry their
+    part of that in their own runs, so that it has nothing to carry over: factors act on what deflection changes.
+    """
+    rows, angle = draft.rows, draft.axis("delta")
+    columns = [rows[c].tolist() for c in ("coefficient", "part", "speed_mps", "depth_m")]
+    places = list(zip(*columns, strict=True))
+    neutral = {places[i]: float(draft.value[i]) for i in np.flatnonzero(chosen & (angle == 0.0)).tolist()}
+    return np.array([neutral.get(place, 0.0) for place in places])
+
+
 def carried_over(draft: Draft) -> str:
     """Stern planes with root, hull and other fins; drag between the plane's own and all of it.
+
+    Factors act on what deflection changes, not on the load of the plane at its neutral angle.
 
     The normal of a deflected plane leans with it, those of root and hull do not, so that pressure drag stays on
     the plane (factor one); drag by lift grows with all the lift (the factor of the force). Between the
@@ -85,11 +103,13 @@ def carried_over(draft: Draft) -> str:
         (["K_d*"], lift * roll, lift * planes.roll_sigma, "carry_over roll"),
     ):
         chosen = draft.where(terms, stern)
-        by_lift = np.where(chosen, draft.value, 0.0) * factor / lift * wide
-        draft.multiply(chosen, factor, sigma, unknown, f"carry_over x{factor:.3f}")
+        kept = at_neutral(draft, chosen)
+        by_lift = np.where(chosen, draft.value - kept, 0.0) * factor / lift * wide
+        draft.multiply(chosen, factor, sigma, unknown, f"carry_over x{factor:.3f}", kept)
         draft.spread("lift slope", by_lift)
     drag, spread = 0.5 * (1.0 + force), float((force - 1.0) / np.sqrt(12.0))
-    draft.multiply(draft.where(["X_d*"], stern), drag, spread, "carry_over drag", f"carry_over x{drag:.3f}")
+    chosen = draft.where(["X_d*"], stern)
+    draft.multiply(chosen, drag, spread, "carry_over drag", f"carry_over x{drag:.3f}", at_neutral(draft, chosen))
     return (
         f"lift slope {measured:.2f} by runs and {_VISCOUS * planes.lift_slope:.2f} by lattice: "
         f"x{lift:.3f} +- {wide:.3f}; "
@@ -114,18 +134,10 @@ def forward_planes(draft: Draft) -> str:
     except (InputError, KeyError) as error:
         raise NotApplicable(str(error)) from error
     force, moment = float(downwash.force_factor), float(downwash.moment_factor)
-    draft.multiply(
-        draft.where(["Z_d*"], forward),
-        force,
-        downwash.force_sigma,
-        "tail_downwash force",
-        f"downwash x{force:.3f}",
-    )
-    draft.multiply(
-        draft.where(["M_d*"], forward),
-        moment,
-        downwash.moment_sigma,
-        "tail_downwash moment",
-        f"downwash x{moment:.3f}",
-    )
+    for term, factor, sigma, unknown in (
+        ("Z_d*", force, downwash.force_sigma, "tail_downwash force"),
+        ("M_d*", moment, downwash.moment_sigma, "tail_downwash moment"),
+    ):
+        of_term = draft.where([term], forward)
+        draft.multiply(of_term, factor, sigma, unknown, f"downwash x{factor:.3f}", at_neutral(draft, of_term))
     return f"heave x{force:.3f} +- {downwash.force_sigma:.3f}, pitch x{moment:.3f} +- {downwash.moment_sigma:.3f}"
