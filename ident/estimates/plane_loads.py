@@ -53,7 +53,7 @@ def lift_slope(draft: Draft, planes: CarryOver) -> tuple[float, float, float]:
     return mean / measured, float(weight.sum() ** -0.5) / measured, measured
 
 
-def _planes(draft: Draft) -> CarryOver:
+def planes_of(draft: Draft) -> CarryOver:
     """Carry-over of the draft's vehicle, computed once."""
     if "carry_over" not in draft.memo:
         draft.memo["carry_over"] = carry_over(draft.vehicle)
@@ -93,7 +93,7 @@ def carried_over(draft: Draft) -> str:
     if not draft.where(["Z_d*", "Y_d*"], stern).any():
         raise NotApplicable("no loads of stern planes by part")
     try:
-        planes = _planes(draft)
+        planes = planes_of(draft)
     except InputError as error:
         raise NotApplicable(str(error)) from error
     lift, wide, measured = lift_slope(draft, planes)
@@ -130,7 +130,7 @@ def forward_planes(draft: Draft) -> str:
     if not draft.where(["[ZM]_d*"], forward).any():
         raise NotApplicable("no loads of sail planes by part")
     try:
-        downwash = tail_downwash(draft.vehicle, draft.rows, _planes(draft))
+        downwash = tail_downwash(draft.vehicle, draft.rows, planes_of(draft))
     except (InputError, KeyError) as error:
         raise NotApplicable(str(error)) from error
     force, moment = float(downwash.force_factor), float(downwash.moment_factor)

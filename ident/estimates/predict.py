@@ -21,6 +21,7 @@ from ident.estimates.pitching import pure_pitch
 from ident.estimates.plane_loads import carried_over, forward_planes
 from ident.estimates.potential import unmeasured
 from ident.estimates.roll import roll_damping
+from ident.estimates.sail_vortex import sail_vortex
 from ident.estimates.saturation import saturation
 from ident.estimates.turning import Given, cross_flow, even_loads
 from sim.boat.vehicle import Vehicle
@@ -56,6 +57,7 @@ _WORK: dict[str, Callable[[Draft, Given], str]] = {
     "saturation": lambda draft, given: saturation(draft),
     "carry_over": lambda draft, given: carried_over(draft),
     "tail_downwash": lambda draft, given: forward_planes(draft),
+    "sail_vortex": lambda draft, given: sail_vortex(draft),
     "cross_flow": cross_flow,
     "pure_pitch": pure_pitch,
     "roll_damping": roll_damping,
