@@ -22,9 +22,7 @@ from rich.console import Console
 
 import ident
 from ident.captive.campaign import Campaign, read_campaign
-from ident.captive.grids import convergence
 from ident.cfd.matrix import read_matrix
-from ident.cfd.motions import screw
 from ident.cfd.progress import progress
 from ident.cfd.screen import show_progress
 from ident.cli import main
@@ -379,34 +377,6 @@ def test_depth_without_a_surface_is_refused(tmp_path):
     assert "depths" in text
     assert "double_body" in text
     assert not wrote
-
-
-# -- closed forms ------------------------------------------------------------------------------------
-
-
-def test_a_screw_motion_gives_back_the_velocity_of_the_origin():
-    rng = np.random.default_rng(3)
-    for _ in range(20):
-        velocity, rate = rng.standard_normal(3), rng.standard_normal(3)
-        along, centre = screw(velocity, rate)
-        assert along + np.cross(rate, -centre) == pytest.approx(velocity)
-        assert np.cross(along, rate) == pytest.approx(np.zeros(3), abs=1e-12)
-
-
-@pytest.mark.parametrize("order", [0.7, 1.0, 1.6, 2.0])
-def test_richardson_finds_order_and_error_of_a_power_law(order):
-    values = [1.0 + 0.03 * 1.4 ** (order * k) for k in range(3)]
-    found = convergence(*values, 1.4)
-    assert found.kind == "monotonic"
-    assert found.order == pytest.approx(order)
-    assert found.uncertainty == pytest.approx(1.25 * 0.03)
-
-
-def test_grids_that_do_not_converge_say_so():
-    assert convergence(1.0, 1.1, 1.05, 1.4).kind == "none"
-    swinging = convergence(1.0, 1.1, 0.8, 1.4)
-    assert (swinging.kind, swinging.uncertainty) == ("oscillatory", pytest.approx(0.15))
-    assert convergence(1.0, 2.0, 2.1, 1.4).uncertainty == pytest.approx(3.0 * 1.1)
 
 
 def test_coarser_grids_that_are_missing_are_named(answered, tmp_path):
