@@ -237,13 +237,13 @@ def test_what_decides_each_channel_of_a_flight_is_said(task):
 
 
 def test_two_names_for_one_group_cannot_be_told_apart(folder, campaign, rows):
-    from ident.calibration.version import _identifiability
+    from ident.calibration.cautions import identifiability
 
     twice = {"planes": GROUPS["planes"], "planes_again": GROUPS["planes"]}
     spec, where, _ = load_calibration(write_calibration(folder, groups=twice, name="twice"))
     chosen = parameters(spec, campaign.vehicle, rows, where)
     task = problem(spec, where, campaign.vehicle, rows, chosen)
-    said = _identifiability(task, calibrate(task, workers=1))
+    said = identifiability(task, calibrate(task, workers=1))
     assert any("planes_again and planes cannot be told apart" in s for s in said)
 
 

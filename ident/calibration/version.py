@@ -12,11 +12,12 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from ident.calibration.cautions import UNLEARNT, cautions
 from ident.calibration.estimate import Estimate
 from ident.calibration.estimate import calibrate as most_probable
 from ident.calibration.file import Parameter, apply, load_calibration, parameters
-from ident.calibration.posterior import Sampled, emcee, sample
-from ident.calibration.problem import Channel, Problem, contradictions, problem
+from ident.calibration.posterior import emcee, sample
+from ident.calibration.problem import Channel, Problem, problem
 from ident.calibration.result import (
     Calibrated,
     CalibrationSummary,
@@ -42,12 +43,6 @@ Array = NDArray[np.float64]
 
 # Metadata of the fit that go on with its rows.
 _FIT = ("conversions", "options", "unused", "warnings", "quality", "checks", "runs")
-# Two multipliers whose posterior correlation is beyond this cannot be told apart.
-_ALIKE = 0.9
-# A multiplier whose posterior is this close to its prior was not learnt.
-_UNLEARNT = 0.9
-# A multiplier that moves by more of its standard deviations without one source is said.
-_SHIFTED = 2.0
 
 # Draws of a posterior, or of a design: more would fill the memory, and fly for weeks.
 _MOST_DRAWS = 10_000_000
@@ -83,7 +78,7 @@ def from_data(parameter: Parameter, value: float, sigma: float) -> tuple[float, 
     Value and standard deviation, or None when the maneuvers say next to nothing.
     """
     gained = 1.0 / sigma**2 - 1.0 / parameter.sigma**2
-    if sigma > _UNLEARNT * parameter.sigma or gained <= 0.0:
+    if sigma > UNLEARNT * parameter.sigma or gained <= 0.0:
         return None
     alone = (value / sigma**2 - parameter.mean / parameter.sigma**2) / gained
     return float(alone), float(gained**-0.5)
@@ -114,23 +109,6 @@ def _group(parameter: Parameter, value: float, sigma: float, chosen: bool, evide
     )
 
 
-def _identifiability(task: Problem, estimate: Estimate) -> list[str]:
-    """Which multipliers the maneuvers cannot tell apart, and which they say nothing of."""
-    names = [p.group.name for p in task.chosen]
-    scale = np.outer(estimate.deviation, estimate.deviation)
-    correlation = estimate.covariance / scale
-    said = [
-        f"{names[i]} and {names[j]} cannot be told apart: posterior correlation {correlation[i, j]:+.2f}"
-        for i in range(len(names))
-        for j in range(i)
-        if abs(correlation[i, j]) > _ALIKE
-    ]
-    for name, parameter, sigma in zip(names, task.chosen, estimate.deviation, strict=True):
-        if sigma > _UNLEARNT * parameter.sigma:
-            said.append(f"{name}: the maneuvers say next to nothing of it; it stays at its prior")
-    return said
-
-
 def _left_out(task: Problem, whole: Estimate, workers: int | None, each: Callable[[str], None]) -> list[LeftOut]:
     """The calibration repeated without each source of each case, and what it then predicts."""
     repeated = []
@@ -153,16 +131,6 @@ def _left_out(task: Problem, whole: Estimate, workers: int | None, each: Callabl
         values, sigmas, shifts = ([float(x) for x in vector] for vector in (estimate.theta, estimate.deviation, shift))
         repeated.append(LeftOut(*out, values, sigmas, shifts, predicted, trained))
     return repeated
-
-
-def _shifts(task: Problem, left_out: list[LeftOut]) -> list[str]:
-    said = []
-    for one in left_out:
-        for parameter, shift in zip(task.chosen, one.shift_in_sigma, strict=True):
-            if abs(shift) > _SHIFTED:
-                text = f"{parameter.group.name} moves by {abs(shift):.1f} standard deviations without"
-                said.append(f"contradictory data: {text} {one.case} {one.source}")
-    return said
 
 
 def calibrated_rows(rows: pd.DataFrame, chosen: list[Parameter], estimate: Estimate) -> pd.DataFrame:
@@ -382,20 +350,11 @@ def _learnt(
         "covariance": estimate.covariance.tolist(),
         "series": series,
         "left_out": without,
-        "warnings": _warnings(task, estimate, without, drawn),
+        "warnings": cautions(task, estimate, without, drawn),
         "evidence": {which: float(f"{value:.4g}") for which, value in evidence.items()},
         "sampled": drawn,
         "sensitivity": shares,
     }
-
-
-def _warnings(task: Problem, estimate: Estimate, without: list[LeftOut], drawn: Sampled | None) -> list[str]:
-    """What to beware of, that it did not converge first."""
-    halted = [] if estimate.converged else [f"not converged after {estimate.rounds} rounds"]
-    said = halted + contradictions(task) + _shifts(task, without) + _identifiability(task, estimate)
-    if drawn is not None and not drawn.tells:
-        said.append(f"the quadratic is not the posterior: {drawn.verdict}")
-    return said
 
 
 def _metadata(base: Version, task: Problem, summary: CalibrationSummary, message: str) -> dict[str, str]:
