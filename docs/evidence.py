@@ -8,11 +8,15 @@ from typing import Any
 from reference_tables import table
 
 import ident
+from ident.analysis.stability import stability_at
 from ident.captive.campaign import read_campaign
 from ident.database.store import database_rows
 from ident.estimates.appendages import differences
+from ident.fitting.fit import completed
 from ident.identification.identify import identify
 from ident.validation.validate import Validation
+from sim.boat.coefficients import Coefficients
+from sim.boat.mass import Environment
 from sim.boat.vehicle import load_vehicle
 from sim.files.toml_files import bundled
 from sim.flight.case import load_case
@@ -20,9 +24,10 @@ from sim.flight.case import load_case
 ROOT = Path(__file__).resolve().parents[1]
 DATA = ROOT / "raw_captive_data"
 SAMPLES, SEED = 100, 1
+_APPENDED = ("configurations/hull-planes", "configurations/hull-sail")
 # Metrics shown of a case, by what is flown.
 _SHOWN = ("advance_90_heading_m", "tactical_diameter_180_heading_m", "overshoot_1_deg", "overshoot_2_deg")
-_BOATS = ("kvlcc2-", "remus", "lauv", "nps-", "suboff-")
+_BOATS = ("kvlcc2-", "remus", "lauv", "nps-", "suboff-hzz", "suboff-vzz", "suboff-turn")
 # Groups of cases that printed or measured values are counted of, by the beginnings of their names.
 _GROUPS = {
     "`kvlcc2`, model scale, beside the free model": ("kvlcc2-turn", "kvlcc2-zz"),
@@ -79,6 +84,25 @@ def suboff_differences() -> str:
     ]
     head = ["appendage", "derivative", "estimated", "measured difference", "ratio", "standard errors"]
     return f"{inside} of {len(found)} lie within 1.96 standard errors of both.\n\n{table(head, lines)}"
+
+
+def configurations() -> str:
+    """Stability of SUBOFF's five configurations at the speed of the captive tests."""
+    rows = []
+    for folder in ("configurations/hull", "configurations/hull-ring-wing", *_APPENDED, "."):
+        campaign = read_campaign(DATA / "suboff" / folder)
+        made = completed(campaign, database_rows(identify(campaign)))
+        case, _ = load_case(f"{campaign.vehicle.name}-coast" if folder != "." else "suboff-hzz10")
+        water = Environment(case.environment.density_kgpm3, case.environment.gravity_mps2)
+        one = stability_at(Coefficients(campaign.vehicle, made), water, case.initial.speed_mps, case.initial.depth_m)
+        roots = [max(x[0] for x in found) for found in (one.vertical, one.horizontal)]
+        published = int(made["quality"].isin(("published", "no_error_quoted")).sum())
+        indices = [f"{one.g_horizontal:+.3f}", f"{one.g_vertical:+.3f}"]
+        rows.append(
+            [f"`{campaign.vehicle.name}`", f"{published} of {len(made)}", *indices, *(f"{x:+.3f}" for x in roots)]
+        )
+    head = ["configuration", "rows published", "Gh", "Gv", "least stable root, vertical [1/s]", "horizontal [1/s]"]
+    return table(head, rows)
 
 
 def predictions(db: str) -> str:

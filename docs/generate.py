@@ -218,6 +218,7 @@ def main() -> int:
         readme = {"signs": signs(coefficients), "speed": speed(), "commands": whole_commands()}
         prediction: dict[str, str] = {}
         boats = {"vehicles": evidence.vehicles(), "appendages": evidence.suboff_differences()}
+        boats["configurations"] = evidence.configurations()
         if not (only_check or chosen.quick):
             # A calibration takes minutes, so only a full run renews what follows from it.
             prediction["choices"] = choices.choices(db, fitted.campaign)

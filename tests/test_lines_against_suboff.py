@@ -10,12 +10,17 @@ import pandas as pd
 import pytest
 
 import ident
+from ident.analysis.stability import stability_at
 from ident.estimates.predict import predicted
 from ident.estimates.roll import edge_drag, natural_frequency
 from ident.fitting.fit import given_of
+from sim.boat.coefficients import Coefficients
 from sim.boat.database import digest, read_rows
+from sim.boat.mass import Environment
 from sim.boat.vehicle import load_vehicle
 from sim.files.errors import InputError
+from sim.flight.case import load_case
+from sim.flight.simulate import simulate
 from sim.hull.derivatives import derivatives
 from sim.hull.lattice import Fin
 from sim.hull.slender import Lines, hull_added_mass, hull_derivatives, hull_prior, lines, spheroid
@@ -28,6 +33,8 @@ PUBLISHED = {
     "suboff-hull-planes": "configurations/hull-planes/published.csv",
     "suboff-hull-ring-wing": "configurations/hull-ring-wing/published.csv",
 }
+# Gh of Roddy (1990), Table 4.
+INDEX = {"hull": -20.38506, "hull-sail": -4.081818, "hull-planes": -3.152048, "hull-ring-wing": -12.43748}
 NAMES = ("Y_v", "N_v", "Y_ur", "N_ur", "Z_w", "M_w", "Z_uq", "M_uq")
 
 
@@ -105,7 +112,7 @@ def test_lines_of_suboff_have_its_volume():
 
 def _campaign(folder, vehicle):
     text = (ROOT / "raw_captive_data/suboff/configurations/hull/campaign.toml").read_text(encoding="utf-8")
-    text = text.replace('vehicle = "suboff-hull"', f'vehicle = "{vehicle}"')
+    text = text.replace('vehicle = "suboff-hull"', f'vehicle = "{vehicle}"').replace('complete_from = "lines"', "")
     (folder / "campaign.toml").write_text(text, encoding="utf-8")
     return folder
 
@@ -142,8 +149,30 @@ def test_without_runs_and_without_lines_nothing_is_fitted(tmp_path):
         ident.fit(_campaign(tmp_path, "suboff-hull"), db=str(tmp_path / "db"), measured_only=True)
 
 
+@pytest.mark.parametrize("name", [n for n in PUBLISHED if n != "suboff"])
+def test_a_configuration_that_is_completed_from_its_lines_is_stable_as_printed_and_flies(name, tmp_path):
+    """Published values stay; the vertical plane of a body of revolution is its horizontal one, and it coasts."""
+    configuration = name.removeprefix("suboff-")
+    (done,) = ident.fit(ROOT / "raw_captive_data/suboff/configurations" / configuration, db=str(tmp_path / "db"))
+    rows, printed = done.rows.set_index("coefficient"), _published(name)["value"]
+    assert rows.loc[printed.index, "value"].tolist() == printed.tolist()
+    assert {"Z_w", "M_w", "Z_uq", "M_uq", "Y_vdot", "N_rdot", "X_uu"} <= set(rows.index[rows["origin"].eq("estimated")])
+    coefficients = Coefficients(load_vehicle(name), done.rows)
+    case, _ = load_case(f"{name}-coast")
+    found = stability_at(coefficients, Environment(1000.0, 9.81), case.initial.speed_mps, case.initial.depth_m)
+    # Its mass follows from the printed index; what is estimated does not enter.
+    assert found.g_horizontal == pytest.approx(INDEX[configuration], rel=5e-5)
+    assert found.g_vertical < 0.0
+    flight = simulate(case, coefficients)
+    speed = np.sqrt(flight["u"] ** 2 + flight["v"] ** 2 + flight["w"] ** 2)
+    assert np.isfinite(speed).all()
+    # Nothing drives it; without fins at the stern it turns broadside.
+    assert 0.0 < speed[-1] < case.initial.speed_mps
+    assert (np.abs(np.arctan2(np.hypot(flight["v"], flight["w"]), flight["u"])).max() > 1.0) == ("planes" not in name)
+
+
 def test_published_sets_stay_as_their_authors_give_them(tmp_path):
-    folder = ROOT / "raw_captive_data/suboff/configurations/hull"
+    folder = ROOT / "raw_captive_data/suboff"
     (done,) = ident.fit(folder, db=str(tmp_path / "db"))
     (bare,) = ident.fit(folder, db=str(tmp_path / "bare"), measured_only=True)
     assert digest(done.rows) == digest(bare.rows)

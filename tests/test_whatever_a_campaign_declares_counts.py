@@ -55,6 +55,7 @@ HEADER_CASES: dict[str, tuple[dict[str, Any], dict[str, Any], dict[str, Any]]] =
     "SharedError.tests": (GRID, {**GRID, "shared_error.0.tests": ["towing"]}, {}),
     "SharedError.parts": (GRID, {**GRID, "shared_error.0.parts": ["propeller"]}, {}),
     "CampaignFile.absent": ({}, {"absent": {"drift_horizontal.Y": "a balance of one component"}}, {}),
+    "CampaignFile.complete_from": ({}, {"complete_from": "lines"}, {"words": True}),
     "CampaignFile.tables": ({}, {"tables.reference": "no.csv"}, {}),
     "CampaignFile.source": ({}, {"source.0.files": "none.csv"}, {}),
     "CampaignFrame.x": ({}, {"frame.x": "aft", "frame.z": "up"}, {}),

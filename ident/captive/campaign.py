@@ -175,6 +175,13 @@ def _refuse(refused: list[NotRising]) -> None:
     raise InputError(first.where, first.found + rest, first.allowed)
 
 
+def _check_completed(header: CampaignFile, runs: pd.DataFrame, where: str) -> None:
+    """Refuse ``complete_from`` where it changes nothing."""
+    if header.complete_from and (runs.empty or not runs["test"].eq(published.TEST).any()):
+        text = "a campaign with published derivatives: what runs leave out is estimated anyway"
+        raise InputError(f"{where}, key complete_from", repr(header.complete_from), text)
+
+
 def read_campaign(
     folder: str | os.PathLike[str],
     leave_out: bool = False,
@@ -228,6 +235,7 @@ def read_campaign(
     if runs.empty and header.source and not (none_yet or gathered.refused):
         text = "runs that are back; ident runs shows how far a matrix of cases is"
         raise InputError(where, "no file of any [[source]], all of them awaited", text)
+    _check_completed(header, runs, where)
     if runs.empty:
         return Campaign(header, vehicle, run_table({}), digests, *histories, folder=str(folder))
     runs = _converted(runs, folder, header, vehicle, frame)

@@ -311,6 +311,8 @@ class CampaignFile(Data):
     source : Which files hold the runs; every CSV beside this file without.
     pure_yaw : Where pure yaw is pure pitch turned: what had been taken off published loads, with its error.
     shared_error : Errors that all runs of some tests have in common.
+    complete_from : ``lines``: what a published set leaves out is estimated from the vehicle's lines; else it stays as
+        its authors give it.
     absent : Essential loads that a test does not give, with the reason:
         ``"drift_horizontal.N" = "a balance of two components"``.
     """
@@ -333,6 +335,7 @@ class CampaignFile(Data):
     tables: Tables = Field(default_factory=Tables)
     pure_yaw: PureYaw | None = None
     shared_error: list[SharedError] = Field(default_factory=list)
+    complete_from: Literal["", "lines"] = ""
     source: list[Source] = Field(default_factory=list)
 
 

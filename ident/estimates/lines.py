@@ -49,9 +49,10 @@ def from_lines(draft: Draft, given: Given) -> str:
     Raises
     ------
     NotApplicable
-        Without a hull's lines; for a published set, whose authors have said what they leave out; when runs give all.
+        Without a hull's lines; for a published set, whose authors have said what they leave out, unless its campaign
+        asks for it; when runs give all.
     """
-    if draft.rows["origin"].eq("published").any():
+    if draft.rows["origin"].eq("published").any() and not given.complete:
         raise NotApplicable("the set is as its authors give it")
     try:
         by_part = draft.where(["[YZ]_d*"]).any()

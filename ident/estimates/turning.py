@@ -49,11 +49,13 @@ class Given:
     speed : Run of the rotating arm -> speed ahead [m/s].
     pure_yaw : Share of pure yaw taken off by the source and its deviation; None when pure yaw was measured.
     shared : Errors that runs have in common.
+    complete : Whether a published set is completed from the vehicle's lines.
     """
 
     speed: dict[str, float] = field(default_factory=dict)
     pure_yaw: tuple[float, float] | None = None
     shared: tuple[Shared, ...] = ()
+    complete: bool = False
 
 
 def hull_strips(draft: Draft, vertical: bool = False) -> Strips:

@@ -123,7 +123,7 @@ def given_of(campaign: Campaign) -> Given:
             raise InputError(where, f"no run of {' '.join(one.tests + one.parts)}", "tests and parts of the campaign")
         shared.append(Shared(one.name, one.relative, frozenset(chosen["run_id"].astype(str)), tuple(one.loads)))
     yaw = (header.pure_yaw.taken_off, header.pure_yaw.sigma) if header.pure_yaw else None
-    return Given(speed, yaw, tuple(shared))
+    return Given(speed, yaw, tuple(shared), header.complete_from == "lines")
 
 
 def completed(campaign: Campaign, rows: pd.DataFrame) -> pd.DataFrame:
@@ -158,7 +158,7 @@ def metadata(
             "quality": json.dumps({k: q.model_dump() for k, q in header.quality.items()}),
             "checks": json.dumps([f.as_json() for f in findings]),
             "estimates": json.dumps([vars(e) for e in estimates]),
-            "given": json.dumps({"speed": given.speed, "pure_yaw": given.pure_yaw}),
+            "given": json.dumps({"speed": given.speed, "pure_yaw": given.pure_yaw, "complete": given.complete}),
             "message": message,
         }
         | forced
