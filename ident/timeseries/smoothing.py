@@ -175,6 +175,8 @@ def _values(knots: Array, time: Array, derivative: int) -> tuple[Array, NDArray[
 
     count = len(knots) - 2 * _DEGREE - 1
     place = (time - knots[_DEGREE]) / _step(knots)
+    if place.size and (place.min() < -1e-6 or place.max() > count + 1e-6):
+        raise ValueError("samples outside of the knots, where B-splines do not sum to one")
     first = np.clip(np.floor(place).astype(np.int64), 0, count - 1)
     element = BSpline.basis_element(np.arange(_DEGREE + 2.0), extrapolate=False)
     element = element.derivative(derivative) if derivative else element
@@ -272,7 +274,7 @@ def smooth(samples: list[Samples], lo: float | None = None, hi: float | None = N
     Parameters
     ----------
     samples : The first of the path itself; a ``sigma`` of 0 is found from the samples.
-    lo, hi : Times between which the path is wanted; those of the first samples when None.
+    lo, hi : Times between which the path is wanted; those of the samples when None.
 
     Returns
     -------
@@ -282,7 +284,8 @@ def smooth(samples: list[Samples], lo: float | None = None, hi: float | None = N
     density, sigma = _likely(first.time, first.value)
     centre = float(first.value.mean())
     told = [replace(first, value=first.value - centre, sigma=first.sigma or sigma), *samples[1:]]
-    knots = knots_for(first.time, lo, hi)
+    ends = min(float(one.time[0]) for one in told), max(float(one.time[-1]) for one in told)
+    knots = knots_for(first.time, ends[0] if lo is None else lo, ends[1] if hi is None else hi)
     parts = [_gram(knots, s) for s in told]
     bands, right = np.sum([p[0] for p in parts], axis=0), np.sum([p[1] for p in parts], axis=0)
     penalty = _penalty(knots)
@@ -309,5 +312,8 @@ def _density(knots: Array, told: list[Samples], bands: Array, right: Array, near
         left = sum(float(np.sum((s.value - _fitted(knots, solved, s)) ** 2)) / s.sigma**2 for s in told)
         return left + weight * _roughness(knots, solved) + _log_det(factor) - rank * math.log(weight)
 
-    best = minimize_scalar(loss, bounds=(-4.0, 4.0), method="bounded", options={"xatol": 0.02})
+    # The loss may have two bottoms: the deeper one is found on a grid.
+    grid = np.arange(-4.0, 4.5, 1.0)
+    least = grid[int(np.argmin([loss(d) for d in grid]))]
+    best = minimize_scalar(loss, bounds=(least - 1.0, least + 1.0), method="bounded", options={"xatol": 0.02})
     return near * 10.0 ** float(best.x)

@@ -29,6 +29,8 @@ _CLOSE = 0.02
 _ENTRY = math.radians(60.0)
 # A course is steady when it turns by less than this share of the maneuver's largest rate.
 _STEADY = 0.01
+# A course from which a zigzag counts differs from that before it by this at least [rad].
+_ASIDE = math.radians(0.05)
 # A boat trimmed by less than this is level [rad].
 _LEVEL = math.radians(0.05)
 # Share of a body rate by which it may differ from the rate of the angle, along the record, heel and pitch unknown.
@@ -165,6 +167,8 @@ def start_of(one: Recording, maneuver: Maneuver, spec: TrialFile) -> Start:
         known = _pitch(one, record, maneuver, execute[0], spec, said)
     elif record is not None and maneuver.kind != "roll_decay":
         known = _angle(record, execute[0], angle, spec, said)
+        if maneuver.kind == "zigzag" and spec.initial.heading_deg is None:
+            known = _ordered_course(one, record, maneuver, execute[0], known, said)
     sigma = math.hypot(execute[1], one.time_sigma)
     return Start(execute[0], sigma, known[0] if known else None, known[1] if known else 0.0, tuple(said))
 
@@ -215,6 +219,52 @@ def _angle(record: Record, execute: float, angle: str, spec: TrialFile, said: li
         return entry[0], entry[1]
     said.append(f"{name}: that of the smooth path at the execute; no approach is recorded")
     return None
+
+
+def _ordered_course(
+    one: Recording,
+    record: Record,
+    maneuver: Maneuver,
+    execute: float,
+    known: tuple[float, float] | None,
+    said: list[str],
+) -> tuple[float, float] | None:
+    """Course that a zigzag counts from where its rudder shows another than that before the execute.
+
+    The rudder is reversed when the heading differs by the check angle from the ordered course; a model that was not
+    quite on that course, or not yet steady, when the rudder was first laid is counted from it all the same.
+    """
+    control = control_of(one)
+    if control is None or maneuver.check is None:
+        return known
+    path, check = path_of(record), math.radians(maneuver.check)
+    half = 0.5 * float(np.median(np.diff(control.abscissa)))
+    ends = np.array([h.end + half for h in large(holds(control))[:-1] if h.end > execute])
+    ends = ends[(ends > record.abscissa[0]) & (ends < record.abscissa[-1])]
+    if ends.size < 2:
+        return known
+    before = float(path(execute)) if known is None else known[0]
+    turned, rate = path(ends) - before, path(ends, 1)
+    side = np.sign(turned)
+    if abs(float(side.sum())) == side.size:
+        return known
+    # To each side: side (turned - base) = check + lag |rate|; the lag is that of order, gear and sampling.
+    equations = np.column_stack([side, np.abs(rate)])
+    (middle, lag), *_ = np.linalg.lstsq(equations, side * turned - check, rcond=None)
+    left = side * turned - check - equations @ np.array([middle, lag])
+    one_left = float(np.sqrt(left @ left / (ends.size - 2))) if ends.size > 2 else 0.0
+    scatter = math.hypot(one_left, float(np.mean(np.abs(rate))) * 2.0 * half / math.sqrt(12.0))
+    error = scatter * math.sqrt(float(np.linalg.pinv(equations.T @ equations)[0, 0]))
+    late = float(lag * np.mean(np.abs(rate)))
+    own = known[1] if known else float(path.deviation(execute)[0])
+    if abs(late) > 0.1 * check or abs(middle) < max(3.0 * math.hypot(error, own), _ASIDE):
+        return known
+    said.append(
+        f"zigzag counted from {math.degrees(before + middle):.3f} deg +- {math.degrees(error):.3f}: there "
+        f"{one.headers[control.channel]} is reversed at the check angle to both sides; not from the course before "
+        "the execute; heading_deg states it"
+    )
+    return before + middle, error
 
 
 def _entry(record: Record, execute: float) -> tuple[float, float, str] | None:
@@ -324,7 +374,9 @@ def _from_a_steady_course(path: SmoothPath, execute: float, said: list[str]) -> 
     said.append(f"steady course at the execute: its rate there is zero to {100.0 * _STEADY:g} % of the largest")
     steady = Samples(np.array([execute]), np.zeros(1), 1, share)
     first = replace(path.samples[0], value=path.samples[0].value + path.centre)
-    return replace(smooth([first, *path.samples[1:], steady]), shared=path.shared)
+    # An execute between two samples may lie before the first of them.
+    again = smooth([first, *path.samples[1:], steady], lo=min(float(path.knots[4]), execute))
+    return replace(again, shared=path.shared)
 
 
 def _joined(

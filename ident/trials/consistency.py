@@ -178,9 +178,13 @@ def _track(one: Recording) -> list[Finding]:
     findings = []
     name = next((n for n in ("U", "u") if n in one.channels), None)
     if name and float(np.median(middle)) > 0.0:
-        log = one.channels[name]
-        ratio = float(np.median(speed / np.maximum(np.abs(log.at(t)), 1e-9)))
-        worst = float(t[int(np.argmax(np.abs(speed - ratio * log.at(t))))])
+        logs = [one.channels[name].at(t)]
+        if name == "u" and "v" in one.channels:
+            # Speeds ahead and abeam together are that along the track; v may hold something else.
+            logs.append(np.hypot(logs[0], one.channels["v"].at(t)))
+        ratios = [float(np.median(speed / np.maximum(np.abs(log), 1e-9))) for log in logs]
+        ratio, log = min(zip(ratios, logs, strict=True), key=lambda pair: abs(math.log(max(pair[0], 1e-9))))
+        worst = float(t[int(np.argmax(np.abs(speed - ratio * log)))])
         findings += _speed_ratio(one, name, ratio, worst)
     if "psi" in one.channels:
         findings += _course(one, np.unwrap(np.arctan2(paths[1](t, 1), paths[0](t, 1))), t)

@@ -32,9 +32,15 @@ KINDS = (
 _ALLOWED = "zigzag 20/20, vertical_zigzag 10/10, turning_circle 35, " + ", ".join(KINDS[3:])
 # Check angles in use, and how far after the reversal its effect is seen in the heading.
 _CHECKS = (1.0, 2.0, 3.0, 5.0, 7.0, 10.0, 15.0, 20.0, 25.0, 30.0, 35.0)
+# A reversal is seen before its angle by this at most [deg], and later by this share of the rudder's way over.
+_EARLY, _GEAR = 0.15, 0.25
 _NOTICE = math.radians(0.3)
 # A step of a spiral is held for longer [s].
 _STEADY_S = 5.0
+# Share of a stretch that lies near its median where it is a plateau; of a ramp it is a half.
+_PLATEAU = 0.8
+# A turn in which a boat has become steady.
+_A_TURN = math.radians(270.0)
 
 
 @dataclass(frozen=True)
@@ -121,17 +127,42 @@ def holds(record: Record, share: float = 0.04) -> list[Hold]:
         mean = (total[i] - total[start]) / (i - start)
         if i < len(x) and abs(x[i] - mean) <= tolerance:
             continue
-        # A plateau, not a piece of a ramp: its ends are alike.
-        if i - start >= 3 and abs(float(x[i - 1] - x[start])) < tolerance:
-            out.append(Hold(float(t[start]), float(t[i - 1]), float(np.median(x[start:i]))))
+        if i - start >= 3 and not _on_a_ramp(x, start, i) and (plateau := _plateau(x[start:i], tolerance)):
+            first, last = start + plateau[0], start + plateau[1]
+            out.append(Hold(float(t[first]), float(t[last]), float(np.median(x[first : last + 1]))))
         start = i
     return out
+
+
+def _on_a_ramp(x: Array, start: int, end: int) -> bool:
+    """Whether a stretch runs as steeply as what it hangs between: a control sampled often is seen on its way."""
+    into = abs(float(x[start] - x[start - 1])) if start else math.inf
+    out = abs(float(x[end] - x[end - 1])) if end < len(x) else math.inf
+    return abs(float(x[end - 1] - x[start])) / (end - start - 1) > 0.5 * max(into, out)
+
+
+def _plateau(x: Array, tolerance: float) -> tuple[int, int] | None:
+    """First and last sample of a plateau, less what of a ramp hangs on to its ends; None for a piece of a ramp."""
+    if abs(float(x[-1] - x[0])) < tolerance:
+        return 0, x.size - 1
+    near = np.flatnonzero(np.abs(x - np.median(x)) <= 0.5 * tolerance)
+    return (int(near[0]), int(near[-1])) if near.size >= _PLATEAU * x.size else None
 
 
 def large(levels: list[Hold]) -> list[Hold]:
     """The holds of a maneuver, not those by which a straight course is kept."""
     most = max((abs(h.value) for h in levels), default=0.0)
     return [h for h in levels if most > math.radians(0.5) and abs(h.value) > 0.4 * most]
+
+
+def turn_ends(control: Record) -> float | None:
+    """When the rudder leaves the one side that a turn is made to [s]; None where it stays to the end."""
+    levels = holds(control)
+    used = large(levels)
+    if not used or any(h.value * used[0].value < 0.0 for h in used):
+        return None
+    away = [h.start for h in levels if h.start > used[-1].end and abs(h.value) < 0.4 * abs(used[0].value)]
+    return used[-1].end if away else None
 
 
 def control_of(one: Recording, vertical: bool = False) -> Record | None:
@@ -156,6 +187,10 @@ def _by_control(one: Recording, angle: Record, control: Record, vertical: bool) 
         return None
     if len({round(math.degrees(h.value)) for h in levels if h.end - h.start > _STEADY_S}) >= 5:
         return Maneuver("direct_spiral")
+    ended = turn_ends(control)
+    if ended is not None and abs(float(np.interp(ended, angle.abscissa, turned))) > _A_TURN:
+        # A pull-out that ends a turning circle is told by the turn.
+        return Maneuver("turning_circle", planes)
     if any(abs(h.value) < 0.1 * abs(used[0].value) and h.start > used[0].start for h in levels):
         return Maneuver("pull_out")
     if len(used) == 1 and abs(turned[-1]) > math.radians(120.0):
@@ -165,15 +200,23 @@ def _by_control(one: Recording, angle: Record, control: Record, vertical: bool) 
 
 def _zigzag_by_control(used: list[Hold], t: Array, turned: Array, planes: float) -> float | None:
     """Check angle [deg] where the steps are those of a zigzag: to and fro by one angle."""
-    sides = [math.copysign(1.0, h.value) for h in used]
-    to_and_fro = len(used) >= 2 and all(a != b for a, b in itertools.pairwise(sides))
+    used = [list(side)[-1] for _, side in itertools.groupby(used, key=lambda h: h.value > 0.0)]
     alike = all(abs(abs(math.degrees(h.value)) - planes) < 0.2 * planes for h in used)
-    if not (to_and_fro and alike and np.ptp(turned) < math.radians(170.0)):
+    if not (len(used) >= 2 and alike and np.ptp(turned) < math.radians(170.0)):
         return None
     half = 0.5 * float(np.median(np.diff(t)))
-    at = math.degrees(float(np.median([abs(np.interp(h.end + half, t, turned)) for h in used[:-1]])))
-    near = min(_CHECKS, key=lambda c: abs(c - at))
-    return near if abs(near - at) < max(1.0, 0.08 * near) else float(round(at))
+    ends = np.array([h.end + half for h in used[:-1]])
+    turned_at = np.interp(ends, t, turned)
+    sides = [np.abs(turned_at[side]) for side in (turned_at > 0.0, turned_at < 0.0) if side.any()]
+    # The mean of both sides, which a course that was not quite held before does not change.
+    at = math.degrees(float(np.mean([np.median(side) for side in sides])))
+    rates = np.abs(np.interp(ends + half, t, turned) - np.interp(ends - half, t, turned)) / (2.0 * half)
+    rate = math.degrees(float(np.median(rates)))
+    # No rudder is reversed before the check angle, but by a sample; its gear takes a part of the time of its way.
+    way = float(np.median([b.start - a.end for a, b in itertools.pairwise(used)]))
+    near = max((c for c in _CHECKS if c <= at + rate * half + _EARLY), default=_CHECKS[0])
+    late = max(1.0, 0.08 * near, _GEAR * way * rate)
+    return near if abs(near - at) < late else float(round(at))
 
 
 def reversal_angle(t: Array, path: SmoothPath, base: float) -> tuple[float, list[float]]:
@@ -278,4 +321,7 @@ def maneuver_of(one: Recording, text: str) -> tuple[Maneuver, str]:
         return Maneuver("turning_circle"), "turning circle: a track without heading"
     if "phi" in one.channels and not {"psi", "theta"} & set(one.channels):
         return Maneuver("roll_decay"), "roll decay: heel is the only angle"
-    raise InputError(one.file, "a record that shows no maneuver", f"--maneuver, or maneuver in trial.toml: {_ALLOWED}")
+    header = ", ".join(one.headers[name] for name in one.channels)
+    unused = next((f"; {text}" for text in one.assumed if text.startswith("columns not used")), "")
+    what = f"a record that shows no maneuver: {header[:160]}{unused}"
+    raise InputError(one.file, what, f"--maneuver, or maneuver in trial.toml: {_ALLOWED}")

@@ -21,7 +21,7 @@ from ident.trials.drawn import Drawn, Metrics
 from ident.trials.earth import place_of
 from ident.trials.estimators import estimator, run_out
 from ident.trials.keeping import Steering, rudder_used, steering_of
-from ident.trials.maneuvers import Maneuver
+from ident.trials.maneuvers import Maneuver, control_of, turn_ends
 from ident.trials.reading import Recording
 from ident.trials.spec import TrialFile
 
@@ -166,6 +166,8 @@ def measured(
         When the record lacks a channel that the maneuver is measured on.
     """
     end = _range(paths)[1]
+    if maneuver.kind == "turning_circle" and (control := control_of(one)) is not None:
+        end = min(end, turn_ends(control) or end)
     grid = _grid(start.time, end)
     origin = place_of(one, spec, start.time)
     likely = _most_likely(paths, grid, start, origin)

@@ -14,7 +14,7 @@ from ident.captive.quantities import is_unit, split
 from ident.captive.readers.opening import open_sheet, reader_of
 from ident.captive.readers.sheet import Sheet
 from ident.captive.readers.text import COMMENTS, head
-from ident.captive.source import Source
+from ident.captive.source import LOOKED_AT, Source
 from ident.checks.findings import Finding
 from ident.trials.channels import Meaning, channel_of, meaning, plain
 from ident.trials.spec import TrialFile
@@ -24,6 +24,8 @@ from sim.files.record import Record
 
 Array = NDArray[np.float64]
 _MOST_ROWS = 2_000_000
+# What is stated of how a table is written, in the words of a campaign.
+_AS_WRITTEN = ("delimiter", "decimal", "thousands", "encoding", "header_pattern", "skip", "units_row", "names", "table")
 _LONG = ("channel", "value", "unit")
 # Characters by which a line is found again.
 _EXACTLY = 200
@@ -75,13 +77,20 @@ class Recording:
 
 def _source(path: Path, spec: TrialFile) -> Source:
     """How the file is to be opened; a header below titles, or in front of white-space columns, is found."""
-    given = {k: getattr(spec, k) for k in ("delimiter", "decimal", "encoding", "header_pattern", "skip", "units_row")}
+    given = {k: getattr(spec, k) for k in _AS_WRITTEN}
     if given["encoding"] == "utf-8" and _western(path):
         given["encoding"] = "cp1252"
     source = Source(files=path.name, **given)
-    if spec.header_pattern or reader_of(path, source) not in ("table", "columns"):
+    reader = reader_of(path, source)
+    if spec.names and reader in ("table", "columns"):
+        return _without_header(path, source, spec)
+    for key in _AS_WRITTEN:
+        if getattr(spec, key) != getattr(TrialFile(), key) and key not in LOOKED_AT.get(reader, ()):
+            allowed = f"no such key: a file of the kind {reader} is not read by it"
+            raise InputError(f"{path}, trial.toml, key {key}", "stated, and changes nothing", allowed)
+    if spec.header_pattern or reader not in ("table", "columns"):
         return source
-    columns = reader_of(path, source) == "columns"
+    columns = reader == "columns"
     lines = head(path, source.encoding, (), source.skip).text
     if not columns and not spec.delimiter and _below_a_title(lines):
         # The commas are those of a title: the columns are parted by blanks.
@@ -95,9 +104,28 @@ def _source(path: Path, spec: TrialFile) -> Source:
             return source
         return source.model_copy(update={"header_pattern": _exactly(lines[at]), "delimiter": mark})
     if not named:
-        allowed = "a header with the names of the columns, or header_pattern in trial.toml"
+        allowed = "a header with the names of the columns; or names = [...] or header_pattern in trial.toml"
         raise InputError(str(path), "columns without a header that names channels", allowed)
     return source.model_copy(update={"header_pattern": _exactly(lines[named[-1]])})
+
+
+def _in_words_of_a_trial(error: InputError) -> InputError:
+    """An error of the reader of campaigns, its remedy where a trial is stated."""
+    allowed = re.sub(r'ignore = \["(.*?)"\]', r'[channels] "\1" = "-"', error.allowed)
+    allowed = allowed.replace("[[source]]", "trial.toml")
+    if "stands twice" in error.found:
+        allowed = 'each column once: one record a file; or names = ["t [s]", "psi [deg]", "-", ...] in trial.toml '
+        allowed += 'with "-" for the columns of the other run, where two stand side by side'
+    return InputError(error.where, error.found, allowed)
+
+
+def _without_header(path: Path, source: Source, spec: TrialFile) -> Source:
+    """How a file is opened whose columns are named in ``trial.toml``; titles above the numbers are passed over."""
+    numbers = [line for line in head(path, source.encoding, (), source.skip).text if re.search(r"\d", line)]
+    marks = (m for m in (";", ",") if numbers and numbers[-1].count(m) >= len(spec.names) - 1)
+    names = [name if name.strip() not in ("", "-") else f"column {i + 1}" for i, name in enumerate(spec.names)]
+    delimiter = spec.delimiter or next(marks, "")
+    return source.model_copy(update={"reader": "columns", "names": names, "delimiter": delimiter})
 
 
 def _western(path: Path) -> bool:
@@ -191,9 +219,12 @@ def read_recording(path: Path, spec: TrialFile) -> Recording:
     """
     if not path.is_file():
         raise InputError(str(path), "no such file", "a table with a time column and a column a channel")
-    source = _source(path, spec)
-    sheet = open_sheet(path, source)
-    rows, cells = _cells(sheet)
+    try:
+        source = _source(path, spec)
+        sheet = open_sheet(path, source)
+        rows, cells = _cells(sheet)
+    except InputError as error:
+        raise _in_words_of_a_trial(error) from error
     header, said = list(sheet.header), []
     if source.encoding != spec.encoding:
         said.append(f"no UTF-8: read as {source.encoding}")
@@ -239,7 +270,8 @@ def _wide(
     columns = _meanings(sheet, header, spec, said)
     clock = next((i for i, f in enumerate(columns) if f is not None and f.channel == "t"), None)
     if clock is None:
-        text = 'a column of time (t [s], time, UTC), or trial.toml: [channels] "NAME" = "t [s]"'
+        text = 'a column of time (t [s], time, UTC), or trial.toml: [channels] "NAME" = "t [s]"; '
+        text += "names = [...] of a file without a header"
         raise InputError(sheet.where, f"no time among {', '.join(header)[:160]}", text)
     one = columns[clock]
     assert one is not None

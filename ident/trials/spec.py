@@ -121,7 +121,10 @@ class TrialFile(Data):
     source : Where the record comes from.
     delimiter : Where it cannot be found out.
     decimal : Decimal mark, where it cannot be found out.
+    thousands : Mark of digit groups, where it cannot be found out.
     encoding : Of the text, where no byte order mark says it.
+    table : Worksheet, struct, group or zone of a file that holds several.
+    names : Headers of the columns in order, of a file without a header: ``["t [s]", "psi [deg]", "-"]``.
     header_pattern : Regular expression that finds the header line.
     skip : Regular expression of lines that are no data.
     units_row : Whether the row below the header holds the units.
@@ -147,10 +150,19 @@ class TrialFile(Data):
     source: str = ""
     delimiter: Literal["", ",", ";", "\t", " "] = ""
     decimal: Literal["", ".", ","] = ""
+    thousands: Literal["", ".", ",", "'", " "] = ""
     encoding: Encoding = "utf-8"
+    table: Annotated[str, Field(max_length=300)] = ""
+    names: list[str] = Field(default_factory=list)
     header_pattern: str = ""
     skip: str = ""
     units_row: bool = False
+
+    @model_validator(mode="after")
+    def _one_header(self) -> TrialFile:
+        if self.names and (self.header_pattern or self.units_row):
+            raise ValueError("one of names and header_pattern or units_row: names are those of a file without a header")
+        return self
 
     @field_validator("header_pattern", "skip")
     @classmethod

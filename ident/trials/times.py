@@ -15,7 +15,10 @@ from sim.files.errors import InputError
 
 Array = NDArray[np.float64]
 _CLOCK = re.compile(r"(\d{1,2}):(\d{2})(?::(\d{2}(?:[.,]\d*)?))?\s*(am|pm|z|utc)?", re.IGNORECASE)
+_POWER = re.compile(r"\d[eEdD]([+-]?\d+)\s*$")
 _DAY = 86400.0
+# Half digits by which a stamp may be off an even clock: some were rounded before they were scaled and printed.
+_ROUNDED_TWICE = 1.5
 # A step of this many times the usual one is a gap.
 _GAP = 3.5
 
@@ -62,8 +65,12 @@ def _resolution(cells: list[str], raw: Array) -> Array:
     out = np.zeros(len(cells))
     digits = max((len(c.split("e")[0].split("E")[0].replace(".", "").strip("+-0")) for c in cells if c), default=1)
     for i, (cell, value) in enumerate(zip(cells, raw, strict=True)):
-        written = re.search(r"[.,](\d+)", cell)
+        written, power = re.search(r"[.,](\d+)", cell), _POWER.search(cell)
         places = len(written[1]) if written else 0
+        if power:
+            # 1.00E+02: the last digit that is written counts ones.
+            out[i] = 0.5 * 10.0 ** (int(power[1]) - places)
+            continue
         # Trailing zeros are dropped by printing with significant digits.
         size = math.floor(math.log10(abs(value))) if value else 0
         out[i] = 0.5 * 10.0 ** -min(max(places, digits - 1 - size), 9)
@@ -73,9 +80,7 @@ def _resolution(cells: list[str], raw: Array) -> Array:
 def _even(raw: Array, half: Array) -> tuple[float, float] | None:
     """Start and step of an even clock that rounds to every stamp; None when none does."""
     row = np.arange(raw.size, dtype=float)
-    weight = 1.0 / half
-    fit = np.linalg.lstsq(np.column_stack([np.ones(raw.size), row]) * weight[:, None], raw * weight, rcond=None)[0]
-    start, step = float(fit[0]), float(fit[1])
+    start, step, worst = _nearest_even(raw, half)
     if not step > 1e-9 * float(np.max(half)):
         # Stamps that are all alike.
         return None
@@ -88,9 +93,22 @@ def _even(raw: Array, half: Array) -> tuple[float, float] | None:
         if lo <= hi + 1e-9:
             near = raw[0] if lo - 1e-9 <= raw[0] <= hi + 1e-9 else 0.5 * (lo + hi)
             return float(near), simple
-    if np.all(np.abs(start + step * row - raw) <= 1.05 * half + 1e-9):
-        return start, step
-    return None
+    return (start, step) if worst <= _ROUNDED_TWICE else None
+
+
+def _nearest_even(raw: Array, half: Array) -> tuple[float, float, float]:
+    """Start and step of the even clock whose largest distance from a stamp is least, in that stamp's half digit."""
+    from scipy.optimize import linprog
+
+    row = np.arange(raw.size, dtype=float)
+    size = max(float(raw.size), 1.0)
+    line = np.column_stack([np.ones(raw.size), row / size]) / half[:, None]
+    away = -np.ones((raw.size, 1))
+    matrix = np.vstack([np.hstack([line, away]), np.hstack([-line, away])])
+    least = linprog([0.0, 0.0, 1.0], matrix, np.concatenate([raw, -raw]) / np.tile(half, 2), bounds=[(None, None)] * 3)
+    if least.x is None:
+        return float(raw[0]), 0.0, math.inf
+    return float(least.x[0]), float(least.x[1]) / size, float(least.x[2])
 
 
 def stamps(cells: list[str], raw: Array, factor: float, path: str, rows: list[int], column: str) -> Stamps:

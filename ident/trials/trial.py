@@ -16,7 +16,7 @@ from ident.trials.consistency import check_recording, refused
 from ident.trials.earth import in_program_axes
 from ident.trials.exchanged import exchanged
 from ident.trials.keeping import steering_of
-from ident.trials.maneuvers import Maneuver, control_of, maneuver_of
+from ident.trials.maneuvers import Maneuver, control_of, maneuver_of, turn_ends
 from ident.trials.measure import DRAWS, Value, measured
 from ident.trials.reading import Recording, read_recording
 from ident.trials.spec import TrialFile
@@ -120,6 +120,10 @@ def _taken_for_granted(
             f"{spec.step_m:g} m: stated" if stated else "what the last tenth of the record comes to; step_m states it"
         )
         return [f"ordered change of depth: {order}"]
+    if maneuver.kind == "turning_circle" and (control := control_of(one)) is not None:
+        ended = turn_ends(control)
+        words = f"turning circle: until {one.headers[control.channel]} leaves its side at {ended or 0.0:.1f} s"
+        return [f"{words}; --maneuver pull_out measures what follows"] if ended is not None else []
     if maneuver.kind == "rise" and spec.surface_point_m is None:
         return [
             "rise: measured to the end of the record; surface_point_m ends it where that point comes to the surface"
