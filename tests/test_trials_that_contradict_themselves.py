@@ -187,6 +187,7 @@ def every_channel():
 
 NAMED = [("psi [deg]", other) for other in ("u [m/s]", "v [m/s]", "y [m]", "phi [deg]", "delta [deg]")]
 NAMED += [("r [deg/s]", other) for other in ("u [m/s]", "p [deg/s]", "delta [deg]")]
+NAMED += [("r [deg/s]", "phi [deg]"), ("r [deg/s]", "v [m/s]"), ("phi [deg]", "u [m/s]"), ("p [deg/s]", "delta [deg]")]
 NAMED += [("u [m/s]", "v [m/s]"), ("phi [deg]", "p [deg/s]"), ("v [m/s]", "delta [deg]"), ("y [m]", "delta [deg]")]
 
 

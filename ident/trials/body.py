@@ -42,8 +42,27 @@ def pitch_rate(values: Channels, rates: Channels) -> Array:
     )
 
 
+def body_rate(name: str, values: Channels, rates: Channels) -> Array:
+    """The rate r, q or p that the angles say [rad/s]; without both heel and pitch that of its angle.
+
+    Parameters
+    ----------
+    name : ``r``, ``q`` or ``p``.
+    values, rates : Of ``psi``, ``theta`` and ``phi`` at the same times, as far as they are recorded.
+    """
+    angles = {n: v for n, v in values.items() if n in ("psi", "theta", "phi")}
+    inclined = {"phi", "theta"} <= set(angles)
+    if name == "r":
+        return yaw_rate(angles, rates) if inclined else rates["psi"]
+    if name == "q":
+        return pitch_rate(angles, rates) if inclined else rates["theta"]
+    return rates["phi"] - (np.sin(angles["theta"]) * rates.get("psi", np.zeros(1)) if inclined else 0.0)
+
+
 def velocities(values: Channels, rates: Channels) -> Channels:
-    """Speeds u, v, w [m/s] of a track along the axes of the boat; horizontal ones without depth, heel or pitch.
+    """Speeds u, v, w [m/s] of a track along the axes of the boat; horizontal ones without heel or pitch.
+
+    Where heel and pitch are recorded and depth is not, it is taken as kept.
 
     Parameters
     ----------
@@ -53,10 +72,10 @@ def velocities(values: Channels, rates: Channels) -> Channels:
     psi = values["psi"]
     ahead = rates["north"] * np.cos(psi) + rates["east"] * np.sin(psi)
     abeam = rates["east"] * np.cos(psi) - rates["north"] * np.sin(psi)
-    if not {"phi", "theta"} <= set(values) or "z" not in rates:
+    if not {"phi", "theta"} <= set(values):
         return {"u": ahead, "v": abeam}
     cf, sf, ct, st = (f(values[k]) for k in ("phi", "theta") for f in (np.cos, np.sin))
-    down = rates["z"]
+    down = rates.get("z", np.zeros(1))
     inclined = ahead * st + down * ct
     return {"u": ahead * ct - down * st, "v": abeam * cf + inclined * sf, "w": inclined * cf - abeam * sf}
 

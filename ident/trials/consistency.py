@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 from ident.captive.quantities import factor
 from ident.checks.findings import Finding
 from ident.timeseries.smoothing import Samples, SmoothPath, smooth
+from ident.trials.body import body_rate
 from ident.trials.earth import drift
 from ident.trials.reading import Recording
 from sim.files.errors import InputError
@@ -97,6 +99,14 @@ def _inside(record: Record, time: Array) -> NDArray[np.bool_]:
     return np.asarray((time >= record.abscissa[0]) & (time <= record.abscissa[-1]))
 
 
+def expected_rate(one: Recording, name: str, path: Callable[[str], SmoothPath], at: Array) -> Array:
+    """What a rate should be by its angle [SI]; about the axes of the boat where heel and pitch are recorded."""
+    if name == "udot":
+        return path("u")(at, 1)
+    angles = [a for a in ("psi", "theta", "phi") if a in one.channels and len(one.channels[a]) >= 8]
+    return body_rate(name, {a: path(a)(at) for a in angles}, {a: path(a)(at, 1) for a in angles})
+
+
 def _rates(one: Recording, slopes: dict[str, SmoothPath]) -> list[Finding]:
     """Rates against the angles they are rates of, and against those of others."""
     findings = []
@@ -110,7 +120,8 @@ def _rates(one: Recording, slopes: dict[str, SmoothPath]) -> list[Finding]:
                 continue
             inside = _inside(one.channels[angle], rate.abscissa)
             at = rate.abscissa[inside]
-            pair = regressed(at, rate.value[inside], path(at, 1)) if inside.sum() >= 8 else None
+            like = expected_rate(one, name, slopes.__getitem__, at) if angle == RATES[name] else path(at, 1)
+            pair = regressed(at, rate.value[inside], like) if inside.sum() >= 8 else None
             if pair:
                 pairs[angle] = pair
         findings += _of_rate(one, name, pairs)

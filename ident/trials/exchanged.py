@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from ident.checks.findings import Finding
 from ident.timeseries.smoothing import SmoothPath
-from ident.trials.consistency import RATES, finding_of, path_of, regressed
+from ident.trials.consistency import RATES, expected_rate, finding_of, path_of, regressed
 from ident.trials.reading import Recording
+from ident.trials.swapped import steered_by_another, swapped
 
 Array = NDArray[np.float64]
 # Correlation below which a channel is not what its name says, and from which another column is.
@@ -30,6 +31,9 @@ def exchanged(one: Recording) -> list[Finding]:
     one : In program axes.
     """
     path = cache(lambda name: path_of(one.channels[name]))
+    sure = [*swapped(one, path), *steered_by_another(one)]
+    if sure:
+        return sure
     of_columns: dict[frozenset[str], Finding] = {}
     for finding in (*_along_the_track(one, path), *_abeam(one), *_rates(one, path)):
         of_columns.setdefault(frozenset(finding.columns), finding)
@@ -50,8 +54,7 @@ def _rates(one: Recording, path: Callable[[str], SmoothPath]) -> Iterator[Findin
         t = _shared(rate.abscissa, one.channels[angle].abscissa)
         if t.size < _FEWEST:
             continue
-        should = path(angle)(t, 1)
-        pair = regressed(t, rate.at(t), should)
+        pair = regressed(t, rate.at(t), expected_rate(one, name, path, t))
         if pair is not None and abs(pair.correlation) >= _NOT:
             continue
         best: tuple[float, str, str, str] = (_IS, "", "", "")

@@ -198,6 +198,14 @@ def _by_control(one: Recording, angle: Record, control: Record, vertical: bool) 
     return None
 
 
+def steered(one: Recording, angle: str, control: str, record: Record | None = None) -> bool:
+    """Whether a control makes steps to which an angle answers by a zigzag, a turn, a spiral or a pull-out."""
+    record = one.channels[control] if record is None else record
+    if float(np.ptp(one.channels[angle].value)) < math.radians(3.0):
+        return False
+    return _by_control(one, one.channels[angle], record, angle == "theta") is not None
+
+
 def _zigzag_by_control(used: list[Hold], t: Array, turned: Array, planes: float) -> float | None:
     """Check angle [deg] where the steps are those of a zigzag: to and fro by one angle."""
     used = [list(side)[-1] for _, side in itertools.groupby(used, key=lambda h: h.value > 0.0)]

@@ -1,0 +1,208 @@
+"""Two columns under one another's names, told by what all channels of one boat have to do with one another.
+
+A record of one boat fulfils relations: rates are those of their angles, speeds those of the track. Where some are
+broken, two columns are exchanged on trial; when that mends every broken one and breaks none, they stand under one
+another's names. A control is told by what answers to it.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ident.checks.findings import Finding
+from ident.timeseries.smoothing import SmoothPath
+from ident.trials.body import body_rate, velocities
+from ident.trials.consistency import finding_of, regressed
+from ident.trials.maneuvers import steered
+from ident.trials.reading import Recording
+from sim.files.record import Record
+
+Array = NDArray[np.float64]
+Channels = dict[str, Array]
+# Relations: what is measured -> channels by which it is known.
+_RELATIONS = {
+    "r": ("psi",),
+    "p": ("phi",),
+    "q": ("theta",),
+    "u": ("north", "east", "psi"),
+    "v": ("north", "east", "psi"),
+}
+# Angles that stand between a body and those: what they are off breaks the relation too.
+_INCLINED = {"r": ("phi", "theta"), "p": ("theta", "psi"), "q": ("phi", "psi"), "u": (), "v": ()}
+_PLAIN = ("psi", "phi", "theta", "r", "p", "q", "u", "v", "w", "north", "east", "z", "dH", "dV")
+# Correlation and slope from which a relation holds, and beyond which it is broken.
+_HOLDS, _SLOPE = 0.9, 0.15
+_BROKEN, _FAR = 0.8, 0.35
+_FEWEST, _POINTS = 16, 600
+# What moves by less than so many standard errors says nothing.
+_MOVES = 4.0
+_DEGREES = math.degrees(1.0)
+# A heading that has turned so far has been steered before.
+_TURNED = math.radians(2.0)
+_WORDS = {"north": "x", "east": "y"}
+
+
+def swapped(one: Recording, path: Callable[[str], SmoothPath]) -> Iterator[Finding]:
+    """Pairs of columns whose exchange mends every relation that is broken.
+
+    Parameters
+    ----------
+    one : In program axes.
+    path : The smooth path of a channel.
+    """
+    names = [n for n in _PLAIN if n in one.channels and len(one.channels[n]) >= _FEWEST and _moves(one, n)]
+    if not set(_RELATIONS) & set(names):
+        return
+    paths = {n: path(n) for n in names}
+    lo = max(float(p.knots[4]) for p in paths.values())
+    hi = min(float(p.knots[-5]) for p in paths.values())
+    if not hi > lo:
+        return
+    t = np.linspace(lo, hi, _POINTS)
+    values, rates = {n: p(t) for n, p in paths.items()}, {n: p(t, 1) for n, p in paths.items()}
+    quiet = {n: float(np.median(p.deviation(t[:: _POINTS // 6], 1))) for n, p in paths.items()}
+    before = _states(t, values, rates, quiet)
+    broken = {k for k, state in before.items() if state is False}
+    if not broken:
+        return
+    best: tuple[float, str, str] | None = None
+    for a, b in itertools.combinations(names, 2):
+        if not any({a, b} & {k, *_RELATIONS[k], *_INCLINED[k]} for k in broken) or {a, b} == {"north", "east"}:
+            continue
+        for to_b, to_a in _scales(one, a, b):
+            other = values | {a: to_a * values[b], b: to_b * values[a]}
+            slopes = rates | {a: to_a * rates[b], b: to_b * rates[a]}
+            after = _states(t, other, slopes, quiet | {a: to_a * quiet[b], b: to_b * quiet[a]})
+            # None of them broken any more, and one of those that were sound beyond doubt.
+            if any(s is False for s in after.values()) or not any(after.get(k) for k in broken):
+                continue
+            if any(k not in after for k in broken):
+                continue
+            size = _size(t, other, slopes, broken)
+            if best is None or size > best[0]:
+                best = (size, a, b)
+    if best is not None:
+        yield _finding(one, best[1], best[2], ", ".join(sorted(f"{_named(one, k)}" for k in broken)))
+
+
+def steered_by_another(one: Recording) -> Iterator[Finding]:
+    """Rudder and planes, or two angles, exchanged: the maneuver shows under another control or angle only."""
+    controls = [c for c in ("dH", "dV") if c in one.channels]
+    if "dH" not in controls or "psi" not in one.channels:
+        return
+    by_rudder, turns = steered(one, "psi", "dH"), _leaves(one.channels["psi"], _TURNED)
+    if by_rudder and (turns is None or (_moved_at(one.channels["dH"]) or 0.0) <= turns):
+        return
+    for other in (c for c in _PLAIN if c in one.channels and c not in ("psi", "r", "north", "east", "dH")):
+        record = one.channels[other]
+        if not record.unit.startswith("rad"):
+            # Degrees under the header of another unit.
+            record = replace(record, value=record.value / _DEGREES)
+        if steered(one, "psi", other, record) and (_moved_at(record) or 0.0) <= (turns or 0.0):
+            what = f"{one.headers['psi']} answers to {one.headers[other]} and not to {one.headers['dH']}"
+            yield _pair(one, "dH", other, what)
+            return
+    if by_rudder:
+        return
+    if not ("dV" in controls and "theta" in one.channels and steered(one, "theta", "dV")):
+        for angle in ("theta", "phi"):
+            if angle in one.channels and "r" not in one.channels and steered(one, angle, "dH"):
+                what = f"{one.headers[angle]} answers to {one.headers['dH']}, and {one.headers['psi']} does not"
+                yield _pair(one, "psi", angle, what)
+                return
+
+
+def _leaves(record: Record, size: float) -> float | None:
+    """When a channel has left its first value by a size for good as a median of three; None where it does not."""
+    x = record.value
+    middle = np.median(np.lib.stride_tricks.sliding_window_view(x, 3), axis=1)
+    away = np.flatnonzero(np.abs(middle - float(np.median(x[:3]))) > size)
+    return float(record.abscissa[int(away[0]) + 1]) if away.size else None
+
+
+def _moved_at(control: Record) -> float | None:
+    """When a control first moves; at once where it begins at its angle."""
+    most = float(np.max(np.abs(control.value)))
+    if abs(float(np.median(control.value[:3]))) > 0.5 * most:
+        return float(control.abscissa[0])
+    return _leaves(control, 0.2 * most)
+
+
+def _moves(one: Recording, name: str) -> bool:
+    return float(np.ptp(one.channels[name].value)) > 0.0
+
+
+def _known(name: str, values: Channels, rates: Channels) -> Array | None:
+    """What a channel should be, by the others; None where they do not say it."""
+    if any(n not in values for n in _RELATIONS[name]):
+        return None
+    if name in ("u", "v"):
+        return velocities(values, rates if "z" in values else {k: v for k, v in rates.items() if k != "z"})[name]
+    return body_rate(name, values, rates)
+
+
+def _states(t: Array, values: Channels, rates: Channels, quiet: dict[str, float]) -> dict[str, bool | None]:
+    """Of each relation whether it holds, is broken, or neither (None)."""
+    states: dict[str, bool | None] = {}
+    for name in _RELATIONS:
+        should = _known(name, values, rates) if name in values else None
+        if should is None:
+            continue
+        if name in ("u", "v"):
+            speed = float(np.sqrt(np.mean(np.hypot(rates["north"], rates["east"]) ** 2)))
+            away = float(np.sqrt(np.mean((values[name] - should) ** 2))) / max(speed, 1e-12)
+            states[name] = True if away < 0.5 * _SLOPE else False if away > _SLOPE else None
+            continue
+        angle = _RELATIONS[name][0]
+        if float(np.std(should)) < _MOVES * quiet[angle]:
+            continue
+        pair = regressed(t, values[name], should)
+        off = math.inf if pair is None else abs(pair.slope - 1.0)
+        held = pair is not None and pair.correlation > _HOLDS and off < _SLOPE
+        states[name] = True if held else False if pair is None or pair.correlation < _BROKEN or off > _FAR else None
+    return states
+
+
+def _size(t: Array, values: Channels, rates: Channels, names: set[str]) -> float:
+    """The least correlation of some relations."""
+    pairs = [(values[n], _known(n, values, rates)) for n in names]
+    return min(float(np.corrcoef(a, b)[0, 1]) for a, b in pairs if b is not None)
+
+
+def _scales(one: Recording, a: str, b: str) -> list[tuple[float, float]]:
+    """Factors of a's numbers under b's header, and the other way round: degrees may be taken for metres."""
+    angular = [one.channels[n].unit.startswith("rad") for n in (a, b)]
+    if angular[0] == angular[1]:
+        units = [one.channels[n].unit for n in (a, b)]
+        return (
+            [(1.0, 1.0)]
+            if units[0] == units[1]
+            else [(1.0, 1.0), (_DEGREES, 1.0 / _DEGREES), (1.0 / _DEGREES, _DEGREES)]
+        )
+    to_b = _DEGREES if angular[0] else 1.0 / _DEGREES
+    return [(to_b, 1.0 / to_b), (1.0, 1.0)]
+
+
+def _named(one: Recording, name: str) -> str:
+    return f"{one.headers[name]} and {one.headers[_RELATIONS[name][0]]}"
+
+
+def _finding(one: Recording, a: str, b: str, broken: str) -> Finding:
+    """The first of the two is the one that a relation names."""
+    a, b = sorted((a, b), key=lambda n: n not in _RELATIONS)
+    what = f"{broken} do not go together, and do when {one.headers[a]} and {one.headers[b]} change places"
+    return _pair(one, a, b, what)
+
+
+def _pair(one: Recording, a: str, b: str, what: str) -> Finding:
+    header, there = one.headers[a], one.headers[b]
+    text = f"{what}: channels exchanged, {header} and {there}"
+    names = [_WORDS.get(n, n) for n in (a, b)]
+    remedy = f'trial.toml: [channels] "{there}" = "{names[0]} [UNIT]" and "{header}" = "{names[1]} [UNIT]", '
+    return finding_of(one, "exchanged_channels", (a, b), float(one.rows[0][0]), text, remedy + "or mend the file")
