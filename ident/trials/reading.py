@@ -124,7 +124,8 @@ def _without_header(path: Path, source: Source, spec: TrialFile) -> Source:
     numbers = [line for line in head(path, source.encoding, (), source.skip).text if re.search(r"\d", line)]
     marks = (m for m in (";", ",") if numbers and numbers[-1].count(m) >= len(spec.names) - 1)
     names = [name if name.strip() not in ("", "-") else f"column {i + 1}" for i, name in enumerate(spec.names)]
-    delimiter = spec.delimiter or next(marks, "")
+    delimiter: str = spec.delimiter
+    delimiter = delimiter or next(marks, "")
     return source.model_copy(update={"reader": "columns", "names": names, "delimiter": delimiter})
 
 
