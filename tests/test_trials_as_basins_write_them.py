@@ -110,3 +110,12 @@ def test_a_record_of_a_rudder_alone_names_what_it_does_not_use(tmp_path):
     record = {"t [s]": np.arange(50.0), "rudder [deg]": np.full(50, 20.0), "torque [kN]": np.arange(50.0)}
     with pytest.raises(InputError, match=r"rudder \[deg\]; columns not used: torque \[kN\]"):
         measure_trial(write(tmp_path / "one.csv", record), None, COUNT)
+
+
+def test_a_header_behind_a_comment_sign_below_titles_is_read(tmp_path):
+    one = zigzag()
+    rows = [f"{t:.3f}\t{a:.4f}\t{d:.1f}" for t, a, d in zip(one["t"], one["psi"], one["dH"], strict=True)]
+    path = tmp_path / "one.txt"
+    path.write_text("\n".join(["Basin, run 12", "", "# t / s\tpsi / deg\tdelta / deg", *rows]), encoding="utf-8")
+    found = measure_trial(path, None, COUNT).metrics["overshoot_1_deg"]
+    assert found.value == pytest.approx(known()["zigzag"]["overshoot_1_deg"], abs=0.02)

@@ -30,7 +30,7 @@ class Leg:
 
 def _extremum(t: Array, x: Array, i: int) -> tuple[float, float]:
     """Time and value of the extremum near sample ``i``, by the parabola through three."""
-    if i == 0 or i == len(x) - 1:
+    if i == 0 or i == len(x) - 1 or not t[i - 1] < t[i] < t[i + 1]:
         return float(t[i]), float(x[i])
     # Divided differences: a fit by linear algebra would round by the machine it runs on.
     before, after = t[i - 1] - t[i], t[i + 1] - t[i]

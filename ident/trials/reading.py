@@ -98,10 +98,14 @@ def _source(path: Path, spec: TrialFile) -> Source:
     mark = next((m for m in (";", "\t", ",") if not columns and any(m in t for t in lines[:_TITLES])), None)
     named = [i for i, line in enumerate(lines[:_TITLES]) if _names(line, mark) >= 2]
     if not columns:
-        at = next((i for i in named if not lines[i].lstrip().startswith(COMMENTS)), 0)
+        # A header behind a comment sign, below titles that have none, is the last line that names channels.
+        at = next((i for i in named if not lines[i].lstrip().startswith(COMMENTS)), named[-1] if named else 0)
         above = [t for t in lines[:at] if not t.lstrip().startswith(COMMENTS) and not t.startswith("sep=")]
         if not above:
             return source
+        if mark and lines[at].lstrip().startswith(COMMENTS) and named:
+            header = [cell.strip(' "#%!') for cell in lines[at].split(mark)]
+            return source.model_copy(update={"reader": "columns", "names": header, "delimiter": mark})
         return source.model_copy(update={"header_pattern": _exactly(lines[at]), "delimiter": mark})
     if not named:
         allowed = "a header with the names of the columns; or names = [...] or header_pattern in trial.toml"
