@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from ident.captive.known_tests import tests
-from ident.captive.run_table import DIRECT, MEASURED, NUMBERS, sigma
+from ident.captive.run_table import DIRECT, MEASURED, sigma
 from sim.boat.catalogue import OUTPUTS
 from sim.boat.parts import vehicle_terms
 from sim.boat.vehicle import Vehicle
@@ -37,20 +37,23 @@ def check_words(folder: Path, runs: pd.DataFrame, allowed: dict[str, list[str]])
             raise InputError(place, repr(run[column]), ", ".join(words))
 
 
-def _doubtful(runs: pd.DataFrame) -> pd.Series:
+def _doubtful(runs: pd.DataFrame) -> np.ndarray:
     """True for runs that may lack something: where ``check_complete`` has to look."""
-    blank = runs.reindex(columns=[*NUMBERS, *(sigma(o) for o in MEASURED)]).isna()
-    doubtful = (runs["run_id"] == "") | blank[list(MEASURED)].all(axis=1)
+    # On arrays: a campaign has a table a file, and a comparison of columns costs more than all of its rows.
+    columns = [*MEASURED, *(sigma(o) for o in MEASURED), "rel_sigma"]
+    given = runs.reindex(columns=columns).notna().to_numpy()
+    size = len(MEASURED)
+    loads, errors, relative = given[:, :size], given[:, size:-1], given[:, -1]
+    doubtful = (runs["run_id"] == "").to_numpy() | ~loads.any(axis=1) | (~relative & (loads & ~errors).any(axis=1))
     if "U" in runs:
-        doubtful |= runs["U"] < 0
-    for test in runs["test"].unique():
+        doubtful |= (runs["U"] < 0).to_numpy()
+    named = runs["test"].to_numpy()
+    for test in set(named):
         for need in str(tests().loc[test, "requires"]).split():
             quantity = "plane" if need == "delta" else need
-            doubtful |= (runs["test"] == test) & (runs[quantity].isna() if quantity in runs else True)
+            doubtful |= (named == test) & (runs[quantity].isna().to_numpy() if quantity in runs else True)
     known = {text: set(text.split()) <= set(MEASURED) for text in runs["exclude"].unique()}
-    doubtful |= ~runs["exclude"].map(known).astype(bool)
-    for output in MEASURED:
-        doubtful |= blank["rel_sigma"] & ~blank[output] & blank[sigma(output)]
+    doubtful |= ~runs["exclude"].map(known).to_numpy(bool)
     return doubtful
 
 

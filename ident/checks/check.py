@@ -21,6 +21,7 @@ from ident.captive.readers.opening import open_sheet
 from ident.captive.readers.sheet import run_cells
 from ident.captive.source import Source
 from ident.checks import axes as checks_axes
+from ident.checks import coefficients as checks_coefficients
 from ident.checks import copies as checks_copies
 from ident.checks import fitted as checks_fitted
 from ident.checks import histories as checks_histories
@@ -43,6 +44,7 @@ if TYPE_CHECKING:
 # Importing a module enters its checks in the registry.
 _MODULES = (
     checks_axes,
+    checks_coefficients,
     checks_copies,
     checks_fitted,
     checks_histories,
@@ -191,7 +193,8 @@ def check_campaign(
     evidence = evidence_of(campaign, folder)
     if not campaign.runs.empty:
         known = identified or identify(campaign)
-        evidence = replace(evidence, fitted=checks_fitted.residuals(known))
+        values = checks_coefficients.constant_values(known)
+        evidence = replace(evidence, fitted=checks_fitted.residuals(known), constants=values)
         if not campaign.vehicle.terms_of.tabulated:
             evidence = replace(evidence, derivatives=constants(known))
     return findings_of(evidence, tell)

@@ -155,6 +155,7 @@ class Evidence:
     vehicle : For planes, their mirror and their position.
     campaign : The whole campaign, when the runs are one.
     fitted : Columns coefficient, part, worst (largest residual of its runs, in their standard errors), run.
+    constants : Columns coefficient, part, value, stderr: what has no axis, of any part.
     derivatives, reference : Columns coefficient, value, file, row; the second in the norm
         the first claims.
     labels : Columns sheet, column, description, file, row.
@@ -172,6 +173,7 @@ class Evidence:
     vehicle: Vehicle | None = None
     campaign: Campaign | None = None
     fitted: pd.DataFrame | None = None
+    constants: pd.DataFrame | None = None
     derivatives: pd.DataFrame | None = None
     reference: pd.DataFrame | None = None
     labels: pd.DataFrame | None = None

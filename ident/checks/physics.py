@@ -47,10 +47,17 @@ def prime_sizes(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
     for size in _sizes():
         parts = planes if size["over"] == "plane" else ["", "hull"]
         runs = evidence.runs[(evidence.runs["test"] == size["test"]) & evidence.runs["part"].isin(parts)]
+        if size["test"] == "towing":
+            # Beside a thrust the sign says nothing.
+            runs = runs[runs["n"].fillna(0.0) == 0.0]
         low, high, output = float(size["low"]), float(size["high"]), size["output"]
         for file, group in runs.groupby(together(runs), sort=False):
             values = prime(group, output, body).where(kept(group, output))
             value = slope(group, size["over"], output, body) if size["over"] else float(values.median())
+            if size["sign"] and value * float(size["sign"]) < -low:
+                what = f"{size['quantity']} is {value:.3g}: it pulls the body along, as no water does"
+                yield rule.finding(str(file), [], [output], what + "; the sign of the load, or of the angle?")
+                continue
             value = abs(value)
             # A plane whose force along one axis is small is turned the other way, not too small.
             if not value > 0.0 or ((low <= value or bool(planes and parts == planes)) and value <= high):
@@ -262,6 +269,29 @@ def _plausible(j: np.ndarray, kt: np.ndarray, kq: np.ndarray, rule: Rule) -> boo
     efficiency = float(np.max(j * kt / (2.0 * np.pi * kq)))
     low = rule.limits["kt_low"] <= kt[int(np.argmin(j))] <= rule.limits["kt_high"]
     return bool(low and rule.limits["eta_low"] <= efficiency <= rule.limits["eta_high"])
+
+
+@check("open_water")
+def thrust_that_rises(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
+    """KT and KQ of one curve fall as the propeller advances; a torque turns with the thrust."""
+    runs = evidence.runs
+    ahead = runs[(runs["J"] >= 0.0) & (runs["test"] == "open_water")]
+    for file, group in ahead.groupby("file", sort=False):
+        curve = group.sort_values("J")
+        for name in ("KT", "KQ"):
+            given = curve[kept(curve, name)]
+            value, error = given[name].to_numpy(float), given[f"s_{name}"].fillna(0.0).to_numpy(float)
+            if not len(value):
+                continue
+            slack = rule.limits["rises"] * float(np.abs(value).max()) + 3.0 * error[1:]
+            rises = np.flatnonzero(value[1:] > np.minimum.accumulate(value)[:-1] + slack)
+            against = np.flatnonzero((given["KT"] > 0.0) & (given["KQ"] < 0.0)) if name == "KQ" else []
+            if not len(rises) and not len(against):
+                continue
+            at = given.iloc[int(rises[0]) + 1 if len(rises) else int(against[0])]
+            how = "more than at a lower J" if len(rises) else "against the torque that its thrust needs"
+            what = f"{name} = {at[name]:.4g} at J = {at['J']:g} in run {at['run_id']}, {how}"
+            yield rule.finding(str(file), [int(at["row"])], [name], what)
 
 
 @check("open_water")
