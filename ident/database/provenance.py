@@ -29,6 +29,8 @@ _STATED = (
     "vehicle_origin",
     "within",
     "match",
+    "deduction",
+    "grids",
 )
 
 

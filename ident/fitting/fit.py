@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ident.captive.campaign import Campaign, find_campaigns, read_campaign
+from ident.captive.campaign_file import CampaignFile
 from ident.captive.combine import by_vehicle
 from ident.checks.check import check_campaign, refuse_errors
 from ident.checks.findings import SEVERITIES, Finding
@@ -131,6 +132,14 @@ def completed(campaign: Campaign, rows: pd.DataFrame) -> pd.DataFrame:
     return predicted(campaign.vehicle, rows, given_of(campaign))[0]
 
 
+def _options(header: CampaignFile) -> dict[str, Any]:
+    """What the campaign states of its errors, with where it is said."""
+    stated: dict[str, Any] = {"uncertainty": header.uncertainty.model_dump()}
+    if header.pure_yaw is not None:
+        stated["pure_yaw"] = header.pure_yaw.model_dump()
+    return stated | {f"shared_error {one.name}": one.model_dump(exclude={"name"}) for one in header.shared_error}
+
+
 def metadata(
     campaign: Campaign,
     identification: Identification,
@@ -152,7 +161,7 @@ def metadata(
             "inputs": json.dumps(campaign.digests),
             "conversions": json.dumps(conversions(campaign)),
             "runs": json.dumps(run_sources(campaign)),
-            "options": json.dumps({"uncertainty": header.uncertainty.model_dump()}),
+            "options": json.dumps(_options(header)),
             "unused": json.dumps([astuple(one) for one in identification.unused]),
             "warnings": json.dumps([astuple(one) for one in identification.warnings]),
             "quality": json.dumps({k: q.model_dump() for k, q in header.quality.items()}),
