@@ -45,19 +45,18 @@ def values_a_boat_may_have(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
         return
     norms = {t.name: t.norm for t in vehicle_terms(vehicle)}
     thrust = bool(((runs["n"].fillna(0.0) != 0.0) & (runs["part"] == "hull") & runs["X"].notna()).any())
-    for row in values[values["coefficient"].isin(list(_ranges()))].itertuples():
-        name, value = str(row.coefficient), float(row.value)
+    for row in values[values["coefficient"].isin(list(_ranges()))].to_dict("records"):
+        name, part = str(row["coefficient"]), str(row["part"])
+        value, error = float(row["value"]), float(row["stderr"])
         low, high, basis = _ranges()[name]
         if norms.get(name, "") not in _DIMENSIONLESS:
             low, high = -np.inf, 0.0 if high <= 0.0 else np.inf
-        slack = rule.limits["errors"] * float(row.stderr)
+        slack = rule.limits["errors"] * error
         # What is left of the resistance beside a thrust says nothing.
         if (low - slack <= value <= high + slack) or (thrust and name.startswith("X_")):
             continue
-        place = _place(runs, name, str(row.part))
-        what = (
-            f"{name} ({row.part}) = {value:.4g} +- {row.stderr:.2g}, boats and ships have {low:g} to {high:g}: {basis}"
-        )
+        place = _place(runs, name, part)
+        what = f"{name} ({part}) = {value:.4g} +- {error:.2g}, boats and ships have {low:g} to {high:g}: {basis}"
         yield rule.finding(place[0], place[1], ["value"] if place[1] else [name], what)
 
 

@@ -285,7 +285,8 @@ def thrust_that_rises(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
                 continue
             slack = rule.limits["rises"] * float(np.abs(value).max()) + 3.0 * error[1:]
             rises = np.flatnonzero(value[1:] > np.minimum.accumulate(value)[:-1] + slack)
-            against = np.flatnonzero((given["KT"] > 0.0) & (given["KQ"] < 0.0)) if name == "KQ" else []
+            turns = (given["KT"] > 0.0) & (given["KQ"] < 0.0) & (name == "KQ")
+            against = np.flatnonzero(turns)
             if not len(rises) and not len(against):
                 continue
             at = given.iloc[int(rises[0]) + 1 if len(rises) else int(against[0])]
