@@ -16,6 +16,7 @@ from made_campaigns import CONSTANTS, campaign, history
 
 from ident.captive.campaign import read_campaign
 from ident.checks.check import check_campaign
+from ident.timeseries.faults import usual
 from sim.files.errors import InputError
 
 RHO, LENGTH, SPEED = 1000.0, 70.2, 2.0
@@ -265,6 +266,14 @@ def test_faults_of_a_channel_are_left_out_and_named(tmp_path, fault):
     assert {k for k, name in done.reduced[0].left_out if name == "Y"} == {kind}
     assert {name for _, name in done.reduced[0].left_out} == {"Y"}
     assert not done.reduced[0].clipped
+
+
+def test_tops_of_a_motion_without_noise_are_no_limit():
+    """Twenty cycles whose two highest samples are the same but for rounding: nothing is cut off."""
+    time = np.arange(0.0, 80.0, 0.1) + 12.3
+    record = 0.3 * np.sin(0.5 * np.pi * time)[:, None]
+    assert not usual(iter([record]), ["displacement"], [()]).clipped
+    assert usual(iter([np.minimum(record, 0.2)]), ["displacement"], [()]).clipped
 
 
 def test_a_clipped_channel_is_an_error(tmp_path):

@@ -47,6 +47,7 @@ _CLIPPED = 10
 _OFTEN = 5.0
 # A limit that is so far from the next value, as a share of 98 % of the record, cuts nothing off.
 _APART = 0.2
+_ROUNDED = 2.0**33
 _NINES = re.compile(r"9{3,}0*")
 
 
@@ -66,7 +67,9 @@ class _Extreme:
     seconds: int = 0
 
     def feed(self, values: Array) -> None:
-        signed = self.sign * values
+        # To ten digits: tops of a motion without noise differ by rounding alone, and none of them is a limit.
+        digits, exponent = np.frexp(self.sign * values)
+        signed = np.ldexp(np.round(digits * _ROUNDED), exponent) / _ROUNDED
         for value in np.unique(signed)[-2:]:
             count = int((signed == value).sum())
             if value > self.first:
