@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Any
 
@@ -68,6 +69,8 @@ _SHOWN = {
 _DEFAULT = ("psi", "theta", "phi", "u", "D0", "r")
 # Room below the panels for the abscissa and two lines of legend [inches].
 _LEGEND = 0.95
+# Columns of the legend of planes, and a row of it as a part of the panel's height.
+_LEGEND_COLUMNS, _ROW_OF_LEGEND = 3, 0.12
 
 
 def _shown(values: Array, unit: str) -> tuple[Array, str]:
@@ -202,7 +205,10 @@ def _deflections(done: Validation, planes: list[str], axis: Any) -> None:
     for plane in planes:
         axis.plot(done.simulation[along], np.degrees(done.simulation[plane]), lw=1.0, label=in_figure(plane))
     dress(axis, _ALONG[along], "plane deflection [deg]")
-    axis.legend(fontsize=7, framealpha=0.8, ncols=3)
+    # Room above the curves, so that the legend covers none.
+    low, high = axis.get_ylim()
+    axis.set_ylim(low, high + _ROW_OF_LEGEND * math.ceil(len(planes) / _LEGEND_COLUMNS) * (high - low))
+    axis.legend(loc="upper center", fontsize=7, frameon=False, ncols=_LEGEND_COLUMNS)
 
 
 def _spiral(done: Validation, axis: Any) -> None:
