@@ -146,14 +146,14 @@ def test_a_draught_counts_by_its_normalisation(tmp_path):
 @pytest.mark.parametrize("key", ["taken_off", "sigma", ""])
 def test_the_share_of_pure_yaw_counts_in_estimates(pitch_turned, key):
     """Pure yaw that is pure pitch turned: BB2's, with the share and its deviation stated otherwise, or not at all."""
-    usual = pitch_turned(YAW["pure_yaw"])
-    other = pitch_turned({**YAW["pure_yaw"], key: 0.3} if key else None)
+    found, usual = pitch_turned
+    other = found({**YAW["pure_yaw"], key: 0.3} if key else None)
     assert not usual.equals(other)
 
 
 @pytest.fixture(scope="module")
 def pitch_turned(rows):
-    """The predicted values and errors of BB2 with a statement on pure yaw."""
+    """The predicted values and errors of BB2 by a statement on pure yaw, and those by the usual one."""
     vehicle = load_vehicle("bb2")
     whole = read_campaign(BB2)
 
@@ -162,4 +162,4 @@ def pitch_turned(rows):
         made, _ = predicted(vehicle, rows, given_of(replace(whole, header=header)))
         return made[["coefficient", "value", "stderr"]].reset_index(drop=True)
 
-    return found
+    return found, found(YAW["pure_yaw"])

@@ -10,8 +10,10 @@ from typing import Any
 import pytest
 from declared_campaigns import DRIFT, HEAD, ROWS, differs
 
+import ident
 from ident.captive.quantities import table
 from ident.captive.run_table import TEXT
+from sim.files.errors import InputError
 
 OPEN = "run_id,J,KT,KQ,rel_sigma\na,0,0.47,0.06,0.02\nb,0.5,0.28,0.04,0.02\nc,0.9,0.1,0.02,0.02\n"
 PROPELLER = {
@@ -53,6 +55,17 @@ def test_every_quantity_a_column_may_hold_counts(tmp_path, quantity):
     assert other != text
     differs(tmp_path, {**HEAD, **head, "source": [own]}, {**HEAD, **head, "source": [own]}, {"drift.csv": text},
             {"drift.csv": other})  # fmt: skip
+
+
+@pytest.mark.parametrize("angle", ["alpha_deg", "beta_deg"])
+def test_an_angle_of_flow_at_rest_is_refused(tmp_path, angle):
+    """It changed nothing: every load of incidence or drift goes with the speed."""
+    ident.write_starter(tmp_path / "boat")
+    path = tmp_path / "boat" / "captive" / "acceleration_vdot.csv"
+    head, *rows = path.read_text(encoding="utf-8").splitlines()
+    path.write_text("\n".join([f"{head},{angle}", *(f"{row},8" for row in rows)]) + "\n", encoding="utf-8")
+    with pytest.raises(InputError, match=rf"acceleration_vdot.csv, row 2, column {angle[:-4]}: .* no angle of flow"):
+        ident.read_campaign(tmp_path / "boat" / "captive")
 
 
 TEXTS = {

@@ -130,6 +130,10 @@ def refuse_idle_quantities(runs: pd.DataFrame) -> None:
         if name in runs:
             text = "zero, or the test acceleration: any other run is steady"
             _refuse(runs, (runs["test"] != "acceleration") & (runs[name].fillna(0.0) != 0.0), name, text)
+    for name in ("alpha", "beta"):
+        if name in runs:
+            text = "zero or empty: a boat at rest (U = 0) has no angle of flow"
+            _refuse(runs, (runs["U"] == 0.0) & (runs[name].fillna(0.0) != 0.0), name, text)
     if "J" in runs:
         text = "nothing: an advance coefficient is of a propeller's runs"
         _refuse(runs, runs["J"].notna() & (runs["part"] != "propeller"), "J", text)

@@ -7,7 +7,7 @@ import re
 import numpy as np
 from numpy.typing import NDArray
 
-from ident.trials.spikes import far_from_neighbours
+from ident.timeseries.neighbours import far_from_neighbours
 from sim.files.errors import InputError
 from sim.flight.case import Case
 from sim.flight.series import Series
