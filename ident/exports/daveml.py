@@ -14,6 +14,7 @@ from xml.etree import ElementTree as xml
 import numpy as np
 from numpy.typing import NDArray
 
+from ident.exports.xml_text import xml_text
 from ident.output import check_file, whole
 from ident.validation.boats import Boat
 from sim.boat.catalogue import axes as known_axes
@@ -67,10 +68,8 @@ def export_daveml(boat: Boat, db: str, path: Path) -> dict[str, Any]:
     for c in gridded:
         _function(root, c, names)
     checks = _checks(root, gridded, names)
-    xml.indent(root)
     with whole(path) as part:
-        text = xml.tostring(root, encoding="unicode")
-        part.write_text(f'<?xml version="1.0" encoding="UTF-8"?>\n{text}\n', encoding="utf-8")
+        part.write_text(xml_text(root), encoding="utf-8")
     return {
         "file": str(path),
         "format": "daveml",

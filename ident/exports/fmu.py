@@ -16,6 +16,7 @@ from xml.etree import ElementTree as xml
 
 from ident.exports.c_source import Source, c_source, files, identifier
 from ident.exports.fmi_stubs import stubs
+from ident.exports.xml_text import xml_text
 from ident.output import whole
 from ident.validation.boats import Boat
 from sim.files.errors import InputError
@@ -220,8 +221,7 @@ def _description(
     listed.extend(_described(v, fmi) for v in variables)
     structure = xml.SubElement(root, "ModelStructure")
     _structure(structure, variables, fmi)
-    xml.indent(root)
-    return '<?xml version="1.0" encoding="UTF-8"?>\n' + xml.tostring(root, encoding="unicode") + "\n"
+    return xml_text(root)
 
 
 def _structure(structure: xml.Element, variables: list[_Variable], fmi: int) -> None:
@@ -249,5 +249,4 @@ def _build_description(model: str, names: list[str]) -> str:
         if name.endswith(".c"):
             xml.SubElement(some, "SourceFile", {"name": name})
     xml.SubElement(build, "Library", {"name": "m"})
-    xml.indent(root)
-    return '<?xml version="1.0" encoding="UTF-8"?>\n' + xml.tostring(root, encoding="unicode") + "\n"
+    return xml_text(root)

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ident.exports.gazebo_terms import MOTIONS, Terms, add_rotation_of_water, terms_of
+from ident.exports.xml_text import xml_text
 from ident.output import check_file, whole
 from ident.validation.boats import Boat
 from sim.boat.catalogue import OUTPUTS
@@ -85,10 +86,8 @@ def export_gazebo(boat: Boat, case: Case, db: str, path: Path) -> dict[str, Any]
     )
     xml.SubElement(plugin, "link_name").text = "hull"
     named = _plugin(plugin, terms, added)
-    xml.indent(root)
     with whole(path) as part:
-        text = xml.tostring(root, encoding="unicode")
-        part.write_text(f'<?xml version="1.0" encoding="UTF-8"?>\n{text}\n', encoding="utf-8")
+        part.write_text(xml_text(root), encoding="utf-8")
     return {
         "file": str(path),
         "format": "gazebo",

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from pathlib import Path
 from typing import Any
-from xml.etree import ElementTree as xml
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,6 +33,7 @@ from ident.exports.jsbsim_functions import (
     total,
     value,
 )
+from ident.exports.xml_text import xml_text
 from ident.output import check_file, whole
 from ident.validation.boats import Boat
 from sim.boat.catalogue import OUTPUTS, PLANE_FEATURES, STATES
@@ -100,10 +100,8 @@ def export_jsbsim(boat: Boat, case: Case, db: str, path: Path) -> dict[str, Any]
     reactions.extend(_applied(model))
     root = node("fdm_config", _header(boat, environment, names), *_body(boat, model), reactions, name=boat.vehicle.name)
     root.set("version", "2.0")
-    xml.indent(root)
     with whole(path) as part:
-        text = xml.tostring(root, encoding="unicode")
-        part.write_text(f'<?xml version="1.0" encoding="UTF-8"?>\n{text}\n', encoding="utf-8")
+        part.write_text(xml_text(root), encoding="utf-8")
     return {
         "file": str(path),
         "format": "jsbsim",
