@@ -196,7 +196,7 @@ def check_campaign(
         values = checks_coefficients.constant_values(known)
         evidence = replace(evidence, fitted=checks_fitted.residuals(known), constants=values)
         if not campaign.vehicle.terms_of.tabulated:
-            evidence = replace(evidence, derivatives=constants(known))
+            evidence = replace(evidence, derivatives=_of_hull(values))
     return findings_of(evidence, tell)
 
 
@@ -222,12 +222,9 @@ def _of_several(campaign: Campaign, folder: Path | None, identified: Identificat
     return sorted(findings, key=lambda f: -SEVERITIES.index(f.severity))
 
 
-def constants(identified: Identification) -> pd.DataFrame:
-    """The coefficients without an axis, as a table of derivatives: coefficient, value, stderr, file, row."""
-    errors = np.sqrt(np.diag(identified.covariance))
-    every = zip(identified.nodes, identified.values, errors, strict=True)
-    of_hull = [(n.name, v, e) for n, v, e in every if not n.point and n.part == "hull"]
-    table = pd.DataFrame(of_hull, columns=["coefficient", "value", "stderr"])
+def _of_hull(values: pd.DataFrame) -> pd.DataFrame:
+    """The hull's among the coefficients without an axis, as a table of derivatives."""
+    table = values[values["part"] == "hull"].drop(columns="part").reset_index(drop=True)
     return table.assign(file="identified coefficients", row=table.index + 1)
 
 
