@@ -14,8 +14,8 @@ from sim.boat.vehicle import load_vehicle
 ALONG = np.linspace(0.0, 40.0, 201)
 
 
-def none(_: float) -> float:
-    return 0.0
+def none(along):
+    return 0.0 * along
 
 
 def test_without_a_hull_the_vortex_drifts_with_the_flow_and_in_a_turn_along_a_parabola():
@@ -24,10 +24,19 @@ def test_without_a_hull_the_vortex_drifts_with_the_flow_and_in_a_turn_along_a_pa
     assert vortex_path(8j, lambda s: 0.1 + 0.005 * s, 0.0, none, ALONG) == pytest.approx(-8.0 + 8j, abs=1e-9)
 
 
+def test_vortices_of_one_call_go_each_its_own_way():
+    """As when each is alone: none feels another."""
+    strengths, drifts = np.array([-3.0, 0.5, 2.0]), np.array([0.1, 0.0, -0.2])
+    together = vortex_path(8j, lambda _: drifts, strengths, lambda s: 4.8 - 0.07 * s, ALONG)
+    for end, strength, drift in zip(together, strengths, drifts, strict=True):
+        alone = vortex_path(8j, lambda _, d=drift: d, strength, lambda s: 4.8 - 0.07 * s, ALONG)
+        assert alone == pytest.approx(end, rel=1e-12)
+
+
 def test_behind_a_hull_that_tapers_the_vortex_sinks_as_the_flow_between_them_keeps_its_area():
     """pi (r^2 - a^2) is constant: the stream between hull and vortex."""
 
-    def radius(s: float) -> float:
+    def radius(s):
         return 4.8 - 0.07 * s
 
     end = vortex_path(9.0j, none, 0.0, radius, ALONG)
@@ -37,7 +46,7 @@ def test_behind_a_hull_that_tapers_the_vortex_sinks_as_the_flow_between_them_kee
 def test_beside_a_cylinder_the_image_leads_the_vortex_around_on_a_circle():
     """Milne-Thomson: an image of opposite turn at a^2/r, so that it goes around at Gamma / (2 pi r (r - a^2/r))."""
     a, r, circulation = 4.8, 9.0, 2.0
-    end = vortex_path(1j * r, none, circulation, lambda _: a, ALONG)
+    end = vortex_path(1j * r, none, circulation, lambda s: a + 0.0 * s, ALONG)
     assert abs(end) == pytest.approx(r, rel=1e-8)
     turned = np.angle(end / 1j)
     assert abs(turned) == pytest.approx(40.0 * circulation / (2.0 * np.pi * r * (r - a**2 / r)), rel=1e-7)

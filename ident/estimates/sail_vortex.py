@@ -16,7 +16,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -52,24 +51,24 @@ class Sail:
     deck, top : Heights of the sail's foot and tip above the hull's axis [m].
     end : Trailing edge, aft of the file's origin [m].
     origin : Of the body, aft of the file's origin [m].
-    radius : Station aft of the file's origin -> mean radius of the hull [m].
+    radius : Stations aft of the file's origin -> mean radii of the hull [m].
     """
 
     deck: float
     top: float
     end: float
     origin: float
-    radius: Callable[[float], float]
+    radius: Callable[[Array], Array]
 
 
 def vortex_path(
     start: complex,
-    drift: Callable[[float], float],
-    circulation: float,
-    radius: Callable[[float], float],
+    drift: Callable[[float], Array | float],
+    circulation: Array | float,
+    radius: Callable[[Array], Array],
     stations: Array,
-) -> complex:
-    """Where a vortex that leaves at the first station is at the last, in the plane across the hull.
+) -> NDArray[np.complex128]:
+    """Where vortices that leave at the first station are at the last, in the plane across the hull.
 
     d zeta / ds = cross-flow about the section + its growth or shrinking + the image, all over the speed ahead, by
     Runge and Kutta's fourth order.
@@ -78,39 +77,47 @@ def vortex_path(
     ----------
     start : y to starboard + i height above the axis [m].
     drift : Station -> sideways speed of the section over the speed ahead, (v + x r) / u; to starboard is positive.
-    circulation : Anticlockwise seen from astern, over the speed [m].
-    radius : Station -> radius of the hull [m].
+        One number, or one a vortex.
+    circulation : Of each vortex, each alone in its own flow; anticlockwise seen from astern, over the speed [m].
+    radius : Stations -> radii of the hull [m].
     stations : (n,) increasing aft [m].
+
+    Returns
+    -------
+    Places in the form of ``circulation``.
 
     Examples
     --------
     >>> import numpy as np
-    >>> vortex_path(8j, lambda x: 0.1, 0.0, lambda x: 0.0, np.linspace(0.0, 10.0, 11)).real.round(6)
+    >>> vortex_path(8j, lambda x: 0.1, 0.0, lambda x: 0.0 * x, np.linspace(0.0, 10.0, 11)).real.round(6)
     -1.0
     """
+    near = 1e-3
+    step = np.diff(stations)
+    places = np.concatenate([stations, stations[:-1] + 0.5 * step])
+    size, growth = radius(places), (radius(places + near) - radius(places - near)) / (2.0 * near)
 
-    def velocity(x: float, zeta: complex) -> complex:
-        a, near = radius(x), 1e-3
-        growth = (radius(x + near) - radius(x - near)) / (2.0 * near)
-        cross = -drift(x) * (1.0 - a**2 / zeta**2)
-        image = a**2 / np.conj(zeta)
-        turned = -circulation / (2j * np.pi * (zeta - image)) if a > 0.0 else 0.0
-        return complex(np.conj(cross + a * growth / zeta + turned))
+    def velocity(k: int, zeta: NDArray[np.complex128]) -> NDArray[np.complex128]:
+        a = size[k]
+        cross = -drift(places[k]) * (1.0 - a**2 / zeta**2)
+        turned = -circulation / (2j * np.pi * (zeta - a**2 / np.conj(zeta))) if a > 0.0 else 0.0
+        return np.conj(cross + a * growth[k] / zeta + turned)
 
-    zeta = start
-    for x, h in zip(stations[:-1], np.diff(stations), strict=True):
-        k1 = velocity(x, zeta)
-        k2 = velocity(x + 0.5 * h, zeta + 0.5 * h * k1)
-        k3 = velocity(x + 0.5 * h, zeta + 0.5 * h * k2)
-        k4 = velocity(x + h, zeta + h * k3)
-        zeta += h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
+    zeta = np.full(np.shape(circulation), start, dtype=complex)
+    for k, h in enumerate(step):
+        between = len(stations) + k
+        k1 = velocity(k, zeta)
+        k2 = velocity(between, zeta + 0.5 * h * k1)
+        k3 = velocity(between, zeta + 0.5 * h * k2)
+        k4 = velocity(k + 1, zeta + h * k3)
+        zeta = zeta + h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
     return zeta
 
 
-def vortex_flow(point: complex, vortex: complex, circulation: float) -> Array:
-    """(3,) flow of a long vortex over the speed at a point across the hull, program frame."""
+def vortex_flow(point: complex, vortex: NDArray[np.complex128] | complex, circulation: Array | float) -> Array:
+    """(..., 3) flow of long vortices over the speed at a point across the hull, program frame."""
     velocity = np.conj(circulation / (2j * np.pi * (point - vortex)))
-    return np.array([0.0, velocity.real, -velocity.imag])
+    return np.stack([np.zeros_like(velocity.real), velocity.real, -velocity.imag], axis=-1)
 
 
 def sail_of(vehicle: Vehicle) -> Sail:
@@ -132,19 +139,24 @@ def sail_of(vehicle: Vehicle) -> Sail:
         top=float(table["z_top_m"].max()),
         end=float(table["x_m"].max()),
         origin=float(geometry.origin.value[0]),
-        radius=lambda x: float(np.interp(x, hull.x, mean)),
+        radius=lambda x: np.interp(x, hull.x, mean),
     )
 
 
 def at_planes(
-    sail: Sail, tails: list[Plane], factors: CarryOver, roll: float, drift: Callable[[float], float], length: float
+    sail: Sail,
+    tails: list[Plane],
+    factors: CarryOver,
+    roll: Array | float,
+    drift: Callable[[float], Array | float],
+    length: float,
 ) -> Array:
-    """(planes,) incidence of the stern planes by the whole vortex, in deflection that loads a plane as much [rad].
+    """(planes, ...) incidence of the stern planes by the whole vortex, in deflection that loads a plane as much [rad].
 
     Parameters
     ----------
     sail, tails, factors : Geometry; how planes, roots and hull share the load of a deflection.
-    roll : Roll moment in drift over 1/2 rho U^2 L^3, program frame.
+    roll : (...) roll moments in drift over 1/2 rho U^2 L^3, program frame.
     drift : As of ``vortex_path``.
     length : L [m].
     """
@@ -159,15 +171,9 @@ def at_planes(
     angles = []
     for plane in tails:
         at, axis = complex(plane.position[1], -plane.position[2]), np.array(plane.lift_axis)
-        own = float(vortex_flow(at, vortex, circulation) @ axis)
-        on_axis = float(vortex_flow(0j, vortex, circulation) @ axis)
-        angles.append((1.0 + share["root"] + share["others"]) * own + share["hull"] * on_axis)
+        at_plane, on_axis = (vortex_flow(point, vortex, circulation) @ axis for point in (at, 0j))
+        angles.append((1.0 + share["root"] + share["others"]) * at_plane + share["hull"] * on_axis)
     return np.array(angles)
-
-
-def _alone(sideways: float, _: float) -> float:
-    """Sideways speed over the speed ahead in drift alone, the same at every station."""
-    return sideways
 
 
 def sail_vortex(draft: Draft) -> str:
@@ -194,13 +200,15 @@ def sail_vortex(draft: Draft) -> str:
     answer = {p.name: slopes(rows, p.name, planes["depth_m"].max(), planes["speed_mps"].max()) for p in tails}
     lift = lift_slope(draft, factors)[0]
     change, places = np.zeros(len(rows)), rows[["speed_mps", "depth_m"]].to_numpy(float)
-    for i in np.flatnonzero(rolls):
-        alone = partial(_alone, float(np.tan(np.radians(beta[i]))))
-        angles = at_planes(sail, tails, factors, float(draft.value[i]), alone, length)
+    drifting = np.flatnonzero(rolls)
+    alone = np.tan(np.radians(beta[drifting]))
+    angles = at_planes(sail, tails, factors, draft.value[drifting].astype(float), lambda _: alone, length)
+    loaded = {load: drift & draft.where([f"{load}_uvw"]) for load in _LOADS}
+    for i, of_planes in zip(drifting, angles.T, strict=True):
         same = drift & (beta == beta[i]) & (places == places[i]).all(axis=1)
         for load in _LOADS:
-            gained = sum(a * answer[p.name].get(load, 0.0) for a, p in zip(angles, tails, strict=True))
-            change[same & draft.where([f"{load}_uvw"])] = lift * gained
+            gained = sum(a * answer[p.name].get(load, 0.0) for a, p in zip(of_planes, tails, strict=True))
+            change[same & loaded[load]] = lift * gained
     draft.spread("sail vortex at the stern", _SHARE * change)
     first = drift & draft.where(["N_uvw"]) & (beta == np.min(beta[rolls & (beta > 0.0)]))
     least = float(np.mean(change[first] / draft.value[first]))
