@@ -17,15 +17,14 @@ ROOT = Path(__file__).parents[1]
 
 @pytest.fixture(scope="module")
 def desk(tmp_path_factory):
-    """The starter boat and BB2 in one database, the newer last, as the pages have them."""
+    """What the page on six things makes first; its database of BB2 is the one of the other pages too."""
     matplotlib.use("Agg")
     folder = tmp_path_factory.mktemp("pages")
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)
-        ident.write_starter("my-boat")
         shutil.copytree(ROOT / "raw_captive_data" / "bb2", "raw_captive_data/bb2")
-        ident.fit("my-boat/captive", db="coeff_db")
-        ident.fit("raw_captive_data/bb2", db="coeff_db")
+        exec(compile(_blocks("docs/how-to.md")[0], "docs/how-to.md", "exec"), {})
+        shutil.copytree("bb2_db", "coeff_db")
         yield folder
 
 
@@ -34,17 +33,20 @@ def _blocks(name):
 
 
 def test_the_six_things_run_as_they_stand(desk):
-    names: dict[str, object] = {}
+    names: dict[str, object] = {"ident": ident}
     blocks = _blocks("docs/how-to.md")
-    assert len(blocks) == 4
-    for block in blocks:
+    assert len(blocks) == 7
+    for block in blocks[1:]:
         exec(compile(block.replace("with_bands(200)", "with_bands(4)"), "docs/how-to.md", "exec"), names)
     point = names["point"]
     assert point.runs.item()
     assert "drift_horizontal.csv row" in point.source.item()
     assert names["yaw"].dims == ("beta_deg",)
-    assert names["done"].errors["TRIAL"]["psi"].rmse > 0.0
-    assert len(names["change"]) > 0
+    assert names["done"].errors["EXP"]["psi"].rmse > 0.0
+    assert names["own"].errors["TRIAL"]["psi"].rmse > 0.0
+    assert names["variance"] < sum(names["drift"][name].stderr.item() ** 2 for name in ("N_v", "N_v|v|"))
+    assert {"Y_cross", "N_cross"} <= {one.coefficient for one in names["change"] if one.added}
+    assert list(names["db"].table["message"]) == ["runs alone", ""]
 
 
 def test_the_readme_runs_as_it_stands(desk):

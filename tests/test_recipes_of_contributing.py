@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import json
 import re
 import textwrap
 import tomllib
@@ -12,8 +11,6 @@ from pathlib import Path
 import pytest
 
 import ident
-from ident.captive.readers.arrays import array_sheet
-from ident.captive.readers.sheet import Sheet
 from ident.captive.source import Source
 from sim.boat import catalogue
 
@@ -39,8 +36,7 @@ def test_the_term_of_the_recipe_is_a_row_of_the_table():
 
 
 def test_the_reader_of_the_recipe_reads_and_refuses(tmp_path):
-    names = {"Path": Path, "Source": Source, "Sheet": Sheet, "json": json, "array_sheet": array_sheet}
-    names |= {"InputError": ident.InputError}
+    names = {}
     exec(compile(recipe("python"), "CONTRIBUTING.md", "exec"), names)
     path, source = tmp_path / "runs.jsonl", Source(files="*.jsonl")
     path.write_text('{"beta_deg": 2.0, "Y_N": 10.5}\n{"beta_deg": 4.0, "Y_N": 21.25}\n')
@@ -50,6 +46,10 @@ def test_the_reader_of_the_recipe_reads_and_refuses(tmp_path):
     for damaged in ('{"beta_deg": 2.0}\n{"beta', '{"beta_deg": 2.0}\n{"beta_rad": 2.0}'):
         path.write_text(damaged)
         with pytest.raises(ident.InputError, match="row 2"):
+            names["open_json_lines"](path, source)
+    for damaged in ("", "5\n", "[1, 2]\n"):
+        path.write_text(damaged)
+        with pytest.raises(ident.InputError, match=r"runs\.jsonl"):
             names["open_json_lines"](path, source)
 
 

@@ -6,6 +6,7 @@ import os
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
+from difflib import get_close_matches
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -126,7 +127,7 @@ class DatabaseVersion:
         Raises
         ------
         KeyError
-            Naming the coefficients there are.
+            Naming those of like spelling, or else all there are.
         InputError
             When vehicles tabulate it over different axes; ``of`` chooses one.
 
@@ -142,8 +143,13 @@ class DatabaseVersion:
         """
         rows = self.rows[self.rows["coefficient"] == coefficient].reset_index(drop=True)
         if rows.empty:
-            raise KeyError(f"{coefficient}; version {self.number} has {', '.join(self.coefficients)}")
+            raise KeyError(self._without(coefficient))
         return coefficient_array(rows, coefficient, self._commits(rows))
+
+    def _without(self, coefficient: str) -> str:
+        near = get_close_matches(coefficient, self.coefficients, 3)
+        of_whom = f"version {self.number} ({', '.join(self.vehicles)})"
+        return f"no {coefficient} in {of_whom}; there {'is' if near else 'are'} {', '.join(near or self.coefficients)}"
 
     def _commits(self, rows: pd.DataFrame) -> dict[str, Version]:
         names = [str(v) for v in rows["vehicle"].unique()]
@@ -178,7 +184,7 @@ class DatabaseVersion:
         """
         for name in coefficients:
             if name not in self:
-                raise KeyError(f"{name}; version {self.number} has {', '.join(self.coefficients)}")
+                raise KeyError(self._without(name))
         return row_covariance(self.rows, coefficients or self.coefficients)
 
     def diff(self, other: DatabaseVersion) -> Difference:
@@ -253,6 +259,8 @@ class Database:
     True
     >>> [version.number for version in db]
     [0]
+    >>> db.table["campaign"].to_dict()
+    {0: 'my-boat-tank'}
     """
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
@@ -264,6 +272,14 @@ class Database:
         """Every version, oldest first; read anew each time, others may have committed."""
         history = tuple(versions(self.path))
         return tuple(DatabaseVersion(self.path, v.number, v, history) for v in history)
+
+    @property
+    def table(self) -> pd.DataFrame:
+        """The versions as a table, indexed by number: time, vehicle, campaign, digest, parent, program, message."""
+        import pandas as pd
+
+        columns = ["version", "time", *_SAID]
+        return pd.DataFrame(self.to_dict(), columns=columns).set_index("version")
 
     @property
     def latest(self) -> DatabaseVersion:

@@ -26,6 +26,8 @@ class Series:
     --------
     >>> import ident
     >>> reference = ident.validate("my-boat/zigzag.toml", db="coeff_db", version=0).reference
+    >>> reference
+    Series(TRIAL: psi, r, u over t)
     >>> reference["TRIAL"]["psi"].unit
     'rad'
     """
@@ -34,6 +36,10 @@ class Series:
         self.data = data
         self.abscissa = abscissa
         self.smooth: dict[str, dict[str, Record]] = {}
+
+    def __repr__(self) -> str:
+        listed = "; ".join(f"{source}: {', '.join(records)}" for source, records in self.data.items())
+        return f"Series({listed} over {self.abscissa})"
 
     def measured_on(self, source: str) -> dict[str, Record]:
         """What metrics are measured on: smooth paths where the series of a source are noisy."""
