@@ -60,12 +60,13 @@ class BoatEnv(gymnasium.Env[Array, Array]):
         self.observation_space = spaces.Box(-np.inf, np.inf, (len(self.observed),), np.float64)
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Array, dict[str, Any]]:
-        """Back to the start of the case, spread by the seed; ``options`` may hold a whole ``state``."""
+        """Back to the start of the case, spread, and its sea drawn, by the seed; ``options`` may hold a ``state``."""
         super().reset(seed=seed)
         state = self.task.start.copy()
         if self._episode.spread:
             state[10:12] += self._episode.spread * self.np_random.standard_normal(2)
-        self.plant.reset(state=(options or {}).get("state", state))
+        phases = self._episode.phases(self.np_random)
+        self.plant.reset(state=(options or {}).get("state", state), phases=phases)
         self.task.reset(np.ones(1, dtype=bool))
         return self._observation(), self._said()
 

@@ -5,7 +5,10 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, TypedDict, cast
+from typing import Any, Literal, TypedDict, cast
+
+import numpy as np
+from numpy.typing import NDArray
 
 from ident.environments.tasks import Goal
 from sim.boat.coefficients import Coefficients
@@ -13,6 +16,7 @@ from sim.boat.database import read_rows
 from sim.boat.vehicle import Vehicle, load_vehicle
 from sim.files.errors import InputError
 from sim.flight.case import Case, load_case
+from sim.flight.simulate import waves_of
 
 
 class Options(TypedDict, total=False):
@@ -25,6 +29,8 @@ class Options(TypedDict, total=False):
     period : Time between actions [s], the case's step when None.
     duration : After which an episode is truncated [s], the case's when None.
     spread : Standard deviation of the start: pitch and heading [rad], by the seed; none when zero.
+    sea : ``case``, the waves of the case in every episode; ``drawn``, the same sea at another moment in each, with
+        phases of its components drawn by the seed.
     check, legs, path, ahead, effort : Of the task, ``ident.environments.tasks.Goal``.
     """
 
@@ -34,6 +40,7 @@ class Options(TypedDict, total=False):
     period: float | None
     duration: float | None
     spread: float
+    sea: Literal["case", "drawn"]
     check: float
     legs: int
     path: Sequence[Sequence[float]]
@@ -51,6 +58,7 @@ class Episode:
     steps : Control samples between actions.
     duration : After which an episode is truncated [s].
     spread : Standard deviation of pitch and heading at the start [rad].
+    drawn : Components whose phases are drawn for an episode; none when the sea is the case's.
     goal : Numbers of the task.
     """
 
@@ -59,7 +67,24 @@ class Episode:
     steps: int
     duration: float
     spread: float
+    drawn: int
     goal: Goal
+
+    def phases(self, draw: np.random.Generator, boats: int | None = None) -> NDArray[np.float64] | None:
+        """(components,), or (boats, components), of the waves of an episode [rad]; None for those there are."""
+        if not self.drawn:
+            return None
+        return draw.uniform(0.0, 2.0 * np.pi, self.drawn if boats is None else (boats, self.drawn))
+
+
+def _drawn(sea: str, case: Case) -> int:
+    """Components whose phases are drawn."""
+    if sea not in ("case", "drawn"):
+        raise InputError("environment, sea", repr(sea), "case, drawn")
+    count = int(waves_of(case).amplitude.size) if sea == "drawn" else 0
+    if sea == "drawn" and not count:
+        raise InputError("environment, sea", "drawn, in calm water", "a case with waves")
+    return count
 
 
 def _goal(vehicle: Vehicle, numbers: dict[str, Any]) -> Goal:
@@ -86,12 +111,13 @@ def episode(case: str | os.PathLike[str], options: Options) -> Episode:
     Raises
     ------
     InputError
-        For what does not exist or fit, a number that no task has, or a time between actions that is no multiple of
-        the case's step.
+        For what does not exist or fit, a number that no task has, a time between actions that is no multiple of
+        the case's step, or a sea to be drawn where there are no waves.
     """
     asked = cast("dict[str, Any]", dict(options))
     db, version, vehicle = asked.pop("db", "coeff_db"), asked.pop("version", None), asked.pop("vehicle", None)
     period, duration, spread = asked.pop("period", None), asked.pop("duration", None), asked.pop("spread", 0.0)
+    sea = asked.pop("sea", "case")
     data, where = load_case(os.fspath(case))
     boat = load_vehicle(vehicle) if vehicle is not None else load_vehicle(data.vehicle, beside=where)
     return Episode(
@@ -100,5 +126,6 @@ def episode(case: str | os.PathLike[str], options: Options) -> Episode:
         steps=_steps(period if period is not None else data.run.step_s, data),
         duration=duration or data.run.duration_s,
         spread=spread,
+        drawn=_drawn(sea, data),
         goal=_goal(boat, asked),
     )

@@ -1,4 +1,4 @@
-"""Thousands of boats of one case at once, in deep, calm water, as a Gymnasium vector environment."""
+"""Thousands of boats of one case at once, calm or in waves, as a Gymnasium vector environment."""
 
 from __future__ import annotations
 
@@ -31,14 +31,14 @@ class FleetEnv(VectorEnv[Array, Array, Any]):
     Raises
     ------
     InputError
-        As ``BoatEnv``, and in waves or near the surface.
+        As ``BoatEnv``.
     """
 
     def __init__(
         self,
         num_envs: int = 1,
         task: str = "DepthKeeping",
-        case: str | os.PathLike[str] = "hzz20",
+        case: str | os.PathLike[str] = "ss5-4m",
         **options: Unpack[Options],
     ) -> None:
         self._episode = episode(case, options)
@@ -51,22 +51,22 @@ class FleetEnv(VectorEnv[Array, Array, Any]):
         self.action_space = batch_space(self.single_action_space, num_envs)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.metadata = {"render_modes": [], "autoreset_mode": AutoresetMode.NEXT_STEP}
-        self._time, self._over = np.zeros(num_envs), np.zeros(num_envs, dtype=bool)
+        self._over = np.zeros(num_envs, dtype=bool)
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Array, dict[str, Any]]:
-        """All back to the start of the case, spread by the seed."""
+        """All back to the start of the case, spread, and its seas drawn, by the seed."""
         super().reset(seed=seed)
         self._begin(np.ones(self.num_envs, dtype=bool))
         return self.task.observe(self.plant.state), {}
 
     def _begin(self, which: NDArray[np.bool_]) -> None:
-        self.plant.reset(which)
+        self.plant.reset(which, self._episode.phases(self.np_random, int(which.sum())))
         if self._episode.spread and which.any():
             self.plant.state[which, 10:12] += self._episode.spread * self.np_random.standard_normal(
                 (int(which.sum()), 2)
             )
         self.task.reset(which)
-        self._time[which], self._over[which] = 0.0, False
+        self._over[which] = False
 
     def step(self, actions: Array) -> tuple[Array, Any, Any, Any, dict[str, Any]]:
         """Command dV and dH of every boat for a period."""
@@ -75,11 +75,10 @@ class FleetEnv(VectorEnv[Array, Array, Any]):
         given = np.clip(np.asarray(actions, dtype=float), box.low, box.high)
         self.plant.commands[:, :2] = given
         self.plant.step(self._episode.steps)
-        self._time += self._episode.steps * self.plant.dt
         reward, done = self.task.judge(self.plant.state, given / box.high)
         lost = ~np.isfinite(self.plant.state).all(axis=1)
-        ended = self._time >= self._episode.duration - 1e-9
+        ended = self.plant.time >= self._episode.duration - 1e-9
         reward[lost | again], done[again], ended[again] = 0.0, False, False
         self._begin(again | lost)
-        self._over = (done & ~lost) | ended
+        self._over = done | ended
         return self.task.observe(self.plant.state), reward, done, np.asarray(ended), {}

@@ -20,10 +20,10 @@ def main(tries: int, to: str | None, guard: bool, keep: bool) -> None:
     Example: python -m sim.bench --json -
     """
     from sim.bench.guard import fallen, record, recorded
-    from sim.bench.measure import jsbsim_us, ratios
+    from sim.bench.measure import fleets, jsbsim_us, ratios
 
     measured: dict[str, Any] = ratios(tries, lambda text: click.echo(f"measuring {text}", err=True))
-    measured |= jsbsim_us()
+    measured |= fleets() | jsbsim_us()
     lines = fallen(measured) if guard else []
     if lines:
         # Other work on the machine may have met one of two times only: what fell, fell twice.

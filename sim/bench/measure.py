@@ -16,6 +16,7 @@ from sim.bench.loops import rates, steps
 from sim.boat.coefficients import Coefficients
 from sim.boat.mass import Environment
 from sim.flight.case import Case, load_case
+from sim.flight.fleet import FleetPlant
 from sim.flight.maneuver import CONTROLS, STATE
 from sim.flight.plant import Plant
 from sim.flight.simulate import environment_of, fly, samples_of, simulate
@@ -156,6 +157,26 @@ def _busy(call: Callable[[int], object], times: int) -> tuple[float, float]:
         list(pool.map(call, range(times)))
     elapsed = time.perf_counter() - start
     return elapsed, (time.process_time() - used) / elapsed
+
+
+def fleets(boats: int = FLIGHTS, samples: int = 40) -> dict[str, float]:
+    """Steps a second of many boats moved side by side, over all cores: in calm water, and each in a sea of its own.
+
+    Parameters
+    ----------
+    boats : Of a fleet. samples : Control samples it is moved on by.
+    """
+    coefficients, (case, _) = frozen_boat(), load_case("turn20-ss5-23.69m")
+    speeds = {}
+    for name, flown in (("calm", case.model_copy(update={"waves": None})), ("waves", case)):
+        fleet = FleetPlant(flown, coefficients, boats)
+        phases = np.random.default_rng(1).uniform(0.0, 2.0 * np.pi, fleet.phases.shape)
+        fleet.reset(phases=phases if phases.size else None)
+        fleet.step()
+        start = time.perf_counter()
+        fleet.step(samples)
+        speeds[f"fleet_{name}_steps_per_s"] = boats * samples / (time.perf_counter() - start)
+    return speeds
 
 
 def jsbsim_us(tries: int = 30) -> dict[str, float]:

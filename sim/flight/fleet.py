@@ -1,21 +1,22 @@
-"""Many boats of one kind moved side by side, in deep, calm water: the loop of a plant over all of them."""
+"""Many boats of one kind moved side by side, in calm water or in waves: the loop of a plant over all of them."""
 
 from __future__ import annotations
 
 import os
 from concurrent.futures import ThreadPoolExecutor
-from typing import NamedTuple
+from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from sim.boat.coefficients import Coefficients
 from sim.compiled import outer
-from sim.files.errors import InputError
 from sim.flight import maneuver, orders
 from sim.flight.case import Case
 from sim.flight.simulate import begun, model_of, water_of
-from sim.kernel.layout import workspace
+from sim.kernel.layout import Around, Model, workspace
+from sim.waves.in_waves import Water, phases_of, surroundings, with_phases
+from sim.waves.shared import kept_size, put_in, take_out
 
 Array = NDArray[np.float64]
 
@@ -23,36 +24,68 @@ Array = NDArray[np.float64]
 @outer
 def hold_each(
     v: maneuver.Flight,
+    around: Around,
     f: np.ndarray,
     y: np.ndarray,
     c: np.ndarray,
+    kept: np.ndarray,
+    phases: np.ndarray,
+    time: np.ndarray,
     rate: np.ndarray,
     dt: float,
     steps: int,
     first: int,
     last: int,
 ) -> None:
-    """``sim.flight.maneuver.hold`` for boats ``first`` to ``last`` of (n, ...) commands, states and controls."""
+    """``sim.flight.maneuver.hold`` for boats ``first`` to ``last``.
+
+    Parameters
+    ----------
+    v, around : Of the thread. f, y, c, kept, phases, time : (n, ...) of the boats; one whose state has left the finite
+        numbers is left alone.
+    """
     for i in range(first, last):
+        if not np.isfinite(y[i]).all():
+            continue
+        put_in(around, kept[i], phases[i])
         one = maneuver.Flight(v.m, v.w, v.g, v.q, f[i], v.j, y[i], c[i], v.s, v.k, v.stage)
-        maneuver.hold(one, (), rate, dt, steps, 0.0)
+        time[i] = maneuver.hold(one, around, rate, dt, steps, time[i])
+        take_out(around, kept[i])
 
 
-class _Desk(NamedTuple):
-    """Scratch of one thread: a flight whose commands, state and controls are those of no boat."""
+@dataclass(frozen=True)
+class _Desk:
+    """Scratch of one thread: a flight whose commands, state and controls are those of no boat, and its surroundings."""
 
     flight: maneuver.Flight
+    around: Around
     rate: Array
+
+
+def _desk(model: Model, settings: orders.Settings, start: Array, controls: Array, water: Water | None) -> _Desk:
+    own = with_phases(water, water.sea.waves.phase.copy()) if water else None
+    around = surroundings(own, model.added_mass) if own else ()
+    flight = maneuver.flight_of(model, settings, workspace(model, around), start.copy(), controls.copy())
+    return _Desk(flight, around, np.zeros(controls.size))
+
+
+def _kept(around: Around, count: int) -> Array:
+    """(count, k) what each boat has of its own in surroundings that are as they begin."""
+    first = np.zeros(kept_size(around))
+    if len(around):
+        take_out(around, first)
+    return np.tile(first, (count, 1))
 
 
 class FleetPlant:
     """Boats of one case that move by your commands, all at once, over all cores.
 
-    Each steps as a ``sim.flight.plant.Plant`` does, to the last digit.
+    Each steps as a ``sim.flight.plant.Plant`` does, to the last digit, in the waves of the case or in the same sea with
+    phases of its own.
 
     Parameters
     ----------
-    case : Initial state, water, step; its own control is left out.
+    case : Initial state, water, waves, step; its own control is left out.
     coefficients : Of the vehicle.
     count : Boats.
 
@@ -60,20 +93,19 @@ class FleetPlant:
     ----------
     dt : Control sample [s]. start : (12,) state at the start.
     state, controls : (count, 12), (count, planes + 1), SI and radians.
+    time : (count,) of each boat since its reset [s]; not a number for one whose state left the finite numbers.
     commands : (count, 5) dV, dH [rad], n [1/s], and what tanks have; change it in place.
+    phases : (count, components) of the waves each boat is in [rad]; ``reset`` changes them.
 
     Raises
     ------
     InputError
-        In waves or near the surface, which take a boat's own sums: use several ``Plant`` there.
+        As ``sim.flight.simulate.model_of`` and ``water_of``.
     """
 
     def __init__(self, case: Case, coefficients: Coefficients, count: int) -> None:
         self.vehicle, self.dt = coefficients.vehicle, case.run.step_s
-        if water_of(case, coefficients) is not None:
-            raise InputError(
-                f"case {case.name}", "waves, or a surface in reach", "deep, calm water for many boats at once"
-            )
+        water = water_of(case, coefficients)
         model, self.start, controls, trim, settings = begun(case, self.vehicle, model_of(case, coefficients))
         self._limits = settings.n_limit
         level = (trim.dV, trim.dH) if trim else (0.0, 0.0)
@@ -83,21 +115,33 @@ class FleetPlant:
         self.state = np.tile(self.start, (count, 1))
         self.controls = np.tile(controls, (count, 1))
         self.commands = np.tile(self._level, (count, 1))
+        self.time = np.zeros(count)
         self._given = np.tile(orders.progress(settings, self.start).f, (count, 1))
         self._threads = max(1, min(os.cpu_count() or 1, count))
         self._pool = ThreadPoolExecutor(self._threads)
-        self._desks = [
-            _Desk(
-                maneuver.flight_of(model, settings, workspace(model), self.start.copy(), controls.copy()),
-                np.zeros(controls.size),
-            )
-            for _ in range(self._threads)
-        ]
+        self._desks = [_desk(model, settings, self.start, controls, water) for _ in range(self._threads)]
+        self._water = water
+        self.phases = np.tile(water.sea.waves.phase if water else np.zeros(0), (count, 1))
+        self._kept = _kept(self._desks[0].around, count)
+        self._untouched = self._kept[0].copy()
 
-    def reset(self, which: NDArray[np.bool_] | None = None) -> None:
-        """Back to the start, all or those that are true in a (count,) mask."""
+    def reset(self, which: NDArray[np.bool_] | None = None, phases: ArrayLike | None = None) -> None:
+        """Back to the start, all or those that are true in a (count,) mask.
+
+        Parameters
+        ----------
+        phases : (components,) or (those boats, components) of the waves from now on [rad]; as they are when None.
+
+        Raises
+        ------
+        InputError
+            For phases of another number, that are not finite, or in calm water.
+        """
         some = np.ones(len(self.state), dtype=bool) if which is None else which
+        if phases is not None:
+            self.phases[some] = phases_of(self._water, phases, int(some.sum()))
         self.state[some], self.controls[some], self.commands[some] = self.start, self._moved, self._level
+        self.time[some], self._kept[some] = 0.0, self._untouched
 
     def step(self, steps: int = 1) -> Array:
         """Move every boat on by control samples; states that left the finite numbers stay so.
@@ -116,5 +160,5 @@ class FleetPlant:
         return self.state
 
     def _move(self, steps: int, desk: _Desk, first: int, last: int) -> None:
-        boats = (self._given, self.state, self.controls)
-        hold_each(desk.flight, *boats, desk.rate, self.dt, steps, int(first), int(last))
+        boats = (self._given, self.state, self.controls, self._kept, self.phases, self.time)
+        hold_each(desk.flight, desk.around, *boats, desk.rate, self.dt, steps, int(first), int(last))

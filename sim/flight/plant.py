@@ -19,7 +19,7 @@ from sim.flight.craft import Craft
 from sim.flight.simulate import TANKS, begun, columns_of, uses_tanks
 from sim.kernel.assemble import without_thrust
 from sim.kernel.layout import OUTSIDE, Model, workspace
-from sim.waves.in_waves import surroundings
+from sim.waves.in_waves import phases_of, surroundings, with_phases
 
 Array = NDArray[np.float64]
 
@@ -120,7 +120,9 @@ class Plant:
         boat = load_vehicle(vehicle) if vehicle else load_vehicle(data.vehicle, beside=where)
         return cls(data, Coefficients(boat, read_rows(str(db), version, boat.name)[0]))
 
-    def reset(self, state: ArrayLike | None = None, controls: ArrayLike | None = None) -> None:
+    def reset(
+        self, state: ArrayLike | None = None, controls: ArrayLike | None = None, phases: ArrayLike | None = None
+    ) -> None:
         """Back to time zero and the commands of the start, without loads from outside; what is broken stays so.
 
         Parameters
@@ -128,12 +130,17 @@ class Plant:
         state : (12,) to start from, that of the case when None; SI and radians.
         controls : Deflections [rad], n [1/s] and tanks as they are then, likewise; commands stay those of the case.
             Planes that are stuck are where they stuck, unless given here.
+        phases : (components,) of the waves from now on [rad], that is another moment of the same sea; as they are when
+            None.
 
         Raises
         ------
         InputError
-            For another number of values, or one that is not finite.
+            For another number of values, or one that is not finite; for phases in calm water.
         """
+        if phases is not None:
+            given = phases_of(self._water, phases)
+            self._water = with_phases(self._water, given) if self._water else None
         # Start of the present control sample, and what is left of it.
         self._sample, self._left, self.time = 0.0, self.dt, 0.0
         y, moved = _given("state", state, self._start), _given("controls", controls, self._moved)

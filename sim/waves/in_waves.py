@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from sim.files.errors import InputError
 from sim.hull.emergence import Cells
 from sim.waves.drift import Drift, make_drift
 from sim.waves.linear import Waves, calm
@@ -76,6 +77,37 @@ def water_around(
     second = waves if second_order else calm(waves.density, waves.gravity)
     drift = make_drift(coefficients, environment, second, top_speed)
     return Water(sea, hull, drift, centres, masses, environment.density * environment.gravity)
+
+
+def phases_of(water: Water | None, phases: ArrayLike, boats: int | None = None) -> Array:
+    """Phases as a sea takes them.
+
+    Parameters
+    ----------
+    phases : (components,) or, for so many ``boats``, (boats, components) [rad].
+
+    Raises
+    ------
+    InputError
+        For another number than the sea has components, or a phase that is not finite.
+    """
+    count = water.sea.waves.amplitude.size if water else 0
+    given = np.array(phases, dtype=float)
+    if given.shape not in ((count,), (boats, count)) or not count or not np.isfinite(given).all():
+        each = f", or {boats} times as many" if boats is not None else ""
+        allowed = f"{count} finite numbers, one a component of the waves{each}" if count else "none in calm water"
+        raise InputError("phases of the waves", f"{given.shape} numbers", allowed)
+    return given
+
+
+def with_phases(water: Water, phases: Array) -> Water:
+    """The same sea at another moment or place: other phases of its components.
+
+    Parameters
+    ----------
+    phases : (components,) [rad]; not copied.
+    """
+    return replace(water, sea=water.sea._replace(waves=water.sea.waves._replace(phase=phases)))
 
 
 def _root(matrix: Array, power: float) -> Array:
