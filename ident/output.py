@@ -8,16 +8,16 @@ import glob
 import logging
 import os
 import platform
+import re
 import shutil
 import stat
 import sys
-import tempfile
 from collections.abc import Callable, Iterable, Iterator
 from html import escape
 from pathlib import Path
 from typing import Any, TypeVar
 
-from sim.files.mirror import is_alive
+from sim.files.temporary import is_alive, take_place, temporary_folder
 
 T = TypeVar("T")
 
@@ -28,6 +28,7 @@ Tell = Callable[[str, int, int], None]
 
 # Folders may be shared with other machines, whose processes this one does not see.
 _HOST = platform.node().replace("/", "_")
+_HALF = re.compile(rf"\..*\.{re.escape(_HOST)}\.(\d+)(?:\.[^.]*)?")
 
 
 def silent(what: str, done: int, of: int) -> None:
@@ -116,19 +117,25 @@ def _feed(path: Path, part: Path) -> None:
     else:
         # A pipe that nobody reads would be waited for without end.
         handle = os.open(path, os.O_WRONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_NOCTTY", 0))
-        if hasattr(os, "set_blocking"):
+        if hasattr(os, "O_NONBLOCK"):
             os.set_blocking(handle, True)
     with part.open("rb") as source, open(handle, "wb") as sink:
         shutil.copyfileobj(source, sink)
 
 
 def _remove_left(path: Path) -> None:
-    """Remove what commands that were killed left of ``path``: their process is gone from this machine."""
+    """Remove what commands that were killed left of ``path``."""
     for left in path.parent.glob(glob.escape(f".{path.stem}.{_HOST}.") + "*" + glob.escape(path.suffix)):
         number = left.name[len(f".{path.stem}.{_HOST}.") : len(left.name) - len(path.suffix)]
-        if number.isdecimal() and not is_alive(int(number)):
+        if number.isdecimal() and is_left(left):
             with contextlib.suppress(OSError):
                 left.unlink()
+
+
+def is_left(path: Path) -> bool:
+    """Whether a file is half of one that a process of this machine began, which is gone."""
+    begun = _HALF.fullmatch(path.name)
+    return begun is not None and not is_alive(int(begun[1]))
 
 
 def _begin(part: Path, like: Path) -> None:
@@ -172,8 +179,8 @@ def whole(path: Path) -> Iterator[Path]:
         raise InputError(str(path), "an input of this command", "another file to write to")
     with _as_message(path):
         if _stream_of(path) is not None or _is_fed(path):
-            with tempfile.TemporaryDirectory() as folder:
-                part = Path(folder) / f"part{path.suffix}"
+            with temporary_folder() as folder:
+                part = folder / f"part{path.suffix}"
                 yield part
                 _feed(path, part)
             return
@@ -185,7 +192,7 @@ def whole(path: Path) -> Iterator[Path]:
             _begin(part, target)
             yield part
             size = part.stat().st_size
-            part.replace(target)
+            take_place(part, target)
             _log.info("file written", extra={"file": str(path), "bytes": size})
         finally:
             with contextlib.suppress(OSError):

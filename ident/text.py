@@ -18,6 +18,10 @@ _UNSEEN = frozenset(("Cc", "Cf", "Cs", "Zl", "Zp"))
 _BRACKET = re.compile(r"(\\*)\[([a-z#/@][^\[]*?\])?")
 
 
+# What Windows takes for a device, whatever comes after a point.
+_DEVICE = re.compile(r"(?:con|prn|aux|nul|com\d|lpt\d|com[¹²³]|lpt[¹²³]|conin\$|conout\$) *(?:\..*)?", re.IGNORECASE)
+
+
 def visible(text: str, keep: str = "") -> str:
     r"""Text with every character that would act instead of being shown written out.
 
@@ -70,7 +74,8 @@ def in_figure(text: object) -> str:
 def in_file_name(text: object) -> str:
     """Text as a part of a file's name, which then stays in the folder it is put into.
 
-    Separators, drive letters, control characters and what Windows refuses become an underscore.
+    Separators, drive letters, control characters and what Windows refuses, a name of a device or dots and blanks
+    at the end, become an underscore.
 
     Examples
     --------
@@ -81,5 +86,9 @@ def in_file_name(text: object) -> str:
     if kept.startswith("."):
         # A hidden file, the folder itself or the one above.
         kept = "_" + kept.lstrip(".")
+    if _DEVICE.fullmatch(kept):
+        kept = "_" + kept
+    if kept.endswith((".", " ")):
+        kept = kept.rstrip(". ") + "_"
     # File systems take 255 bytes; suffix and version number are still to come.
     return kept.encode("utf-8")[:180].decode("utf-8", "ignore") or "_"

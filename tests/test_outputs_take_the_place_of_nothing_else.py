@@ -10,6 +10,7 @@ import os
 import stat
 import subprocess
 import sys
+import tempfile
 import threading
 
 import pytest
@@ -23,6 +24,7 @@ from ident.output import check_file, whole
 from ident.text import in_file_name
 from sim.boat.vehicle import load_vehicle
 from sim.files.errors import InputError
+from sim.files.temporary import temporary_folder
 from sim.flight.case import load_case
 
 posix = pytest.mark.skipif(os.name != "posix", reason="POSIX files")
@@ -203,3 +205,23 @@ def test_any_text_names_a_file_in_its_folder(tmp_path_factory, text):
     path.write_text("x")
     assert path.parent.resolve() == tmp_path_factory.getbasetemp().resolve()
     path.unlink()
+
+
+@posix
+def test_temporary_folders_of_killed_processes_go(tmp_path, monkeypatch):
+    """Those of processes that are gone, of this user and this machine; no others."""
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    gone = subprocess.Popen([sys.executable, "-c", ""])
+    gone.wait()
+    with temporary_folder() as kept:
+        (kept / "file").write_text("x")
+        own = kept.name.split(str(os.getpid()))[0]
+        for name in (f"{own}{gone.pid}-x", f"{own}{os.getppid()}-x", f"ident-elsewhere-{gone.pid}-x", "ident-mine"):
+            (tmp_path / name).mkdir()
+        with temporary_folder() as other:
+            assert other != kept
+        assert {p.name for p in tmp_path.iterdir()} == {
+            kept.name, f"{own}{os.getppid()}-x", f"ident-elsewhere-{gone.pid}-x", "ident-mine"
+        }  # fmt: skip
+        assert (kept / "file").read_text() == "x"
+    assert not kept.exists()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import platform
 import tomllib
 from importlib.resources import files
 from pathlib import Path
@@ -77,6 +78,25 @@ def test_nothing_is_overwritten(desk):
     assert [p.name for p in (desk / "full").iterdir()] == ["notes.txt"]
     done = CliRunner().invoke(main, ["new", "full"])
     assert done.exit_code == 2
+
+
+def test_a_folder_that_was_begun_is_finished(desk):
+    """A killed command leaves some files whole and half of one; nothing of anybody else is taken for that."""
+    whole = [p.relative_to(desk / "first") for p in ident.write_starter(desk / "first")]
+    ident.write_starter(desk / "killed")
+    for name in whole[3:]:
+        (desk / "killed" / name).unlink()
+    half = desk / "killed" / f".zigzag.{platform.node()}.{2**22 + 1}.toml"
+    half.write_text("half")
+    (desk / "changed").mkdir()
+    (desk / "changed" / whole[0].name).write_text("mine")
+    again = ident.write_starter(desk / "killed")
+    assert [p.relative_to(desk / "killed") for p in again] == whole
+    assert all((desk / "killed" / name).read_bytes() == (desk / "first" / name).read_bytes() for name in whole)
+    assert not half.exists()
+    for folder in ("first", "changed"):
+        with pytest.raises(ident.InputError, match="not empty"):
+            ident.write_starter(desk / folder)
 
 
 def test_the_starter_is_in_the_package():

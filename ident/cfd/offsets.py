@@ -12,6 +12,7 @@ from ident.cfd.surfaces import closed_bodies, read_patches
 from ident.cfd.template import UNITS
 from ident.output import check_folder, whole
 from sim.files.errors import InputError
+from sim.files.temporary import temporary_folder
 from sim.hull.integral import trapezoid
 from sim.hull.mesh import Mesh
 
@@ -190,14 +191,12 @@ def _ended(body: Mesh, radius: Array, nose: float, tail: float) -> None:
 
 def _volume(x: Array, radius: Array) -> float:
     """Of the offsets as the geometry file's splines take them."""
-    import tempfile
-
     from sim.hull.surface import Hull
 
     header = ",".join(["x_m", *(f"r_{int(a):03d}" for a in _ANGLES)])
     lines = [",".join(repr(float(v)) for v in (s, *r)) for s, r in zip(x, radius, strict=True)]
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "hull.csv"
+    with temporary_folder() as folder:
+        path = folder / "hull.csv"
         path.write_text("\n".join([header, *lines]), encoding="utf-8")
         hull = Hull(path)
     s = 0.5 * (1.0 - np.cos(np.linspace(0.0, np.pi, 401))) * x[-1]

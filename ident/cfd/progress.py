@@ -18,7 +18,7 @@ from ident.cfd.case import Case
 from ident.cfd.matrix import Matrix
 from ident.cfd.template import settings
 from sim.boat.catalogue import OUTPUTS
-from sim.files.mirror import is_alive
+from sim.files.temporary import is_alive
 
 _TIME = re.compile(rb"^Time = ([0-9.eE+-]+)", re.MULTILINE)
 _END = 400000

@@ -15,6 +15,7 @@ from ident.cfd.template import Template, settings
 from sim.boat.vehicle import Vehicle
 from sim.files.extras import library
 from sim.files.schema import checked
+from sim.files.temporary import take_place
 
 _UNITS = {"U": "mps", "D0": "m", "alpha": "deg", "beta": "deg", "plane": "deg"}
 # Motions whose displacement is an angle.
@@ -39,8 +40,11 @@ def write_campaign(out: Path, cases: Sequence[Case], vehicle: Vehicle, vehicle_f
     first = "# Written by ident plan --cases: each [[source]] reads one case of cases/; runs to come are awaited.\n"
     # A further batch reads this file and writes it anew: it takes its own place.
     new = path.with_name(".campaign.new.toml")
-    new.write_text(first + tomli_w.dumps(data), encoding="utf-8")
-    new.replace(path)
+    try:
+        new.write_text(first + tomli_w.dumps(data), encoding="utf-8")
+        take_place(new, path)
+    finally:
+        new.unlink(missing_ok=True)
 
 
 def header(out: Path, vehicle: Vehicle, vehicle_file: str, template: Template) -> dict[str, Any]:

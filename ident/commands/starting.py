@@ -13,5 +13,10 @@ import threading
 # A program of the user's own that imports the command line keeps its handler.
 _OURS = ("ident", "cli.py")
 
-if os.path.basename(sys.argv[0]) in _OURS and threading.current_thread() is threading.main_thread():
+# Where there are no signals of POSIX nobody takes the handler back (``ident.commands.process``).
+if (
+    os.name == "posix"
+    and os.path.basename(sys.argv[0]) in _OURS
+    and threading.current_thread() is threading.main_thread()
+):
     signal.signal(signal.SIGINT, signal.SIG_DFL)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import json
-import tempfile
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -19,6 +18,7 @@ from sim.boat.database import check_digests, column_order, digest, matches, open
 from sim.boat.delta_log import LATEST, LOG, Log, Version, latest_said
 from sim.files.errors import InputError
 from sim.files.storage import Storage, address, engine
+from sim.files.temporary import temporary_folder
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -308,9 +308,9 @@ def _parquet(rows: pd.DataFrame) -> bytes:
     """The data file that a commit of rows writes."""
     from deltalake import write_deltalake
 
-    with tempfile.TemporaryDirectory() as folder, engine(folder, "cannot be written", "room for temporary files"):
-        write_deltalake(address(folder), arrow(rows[column_order()]), mode="error", configuration=FOR_EVER)
-        return next(Path(folder).glob("*.parquet")).read_bytes()
+    with temporary_folder() as folder, engine(str(folder), "cannot be written", "room for temporary files"):
+        write_deltalake(address(str(folder)), arrow(rows[column_order()]), mode="error", configuration=FOR_EVER)
+        return next(folder.glob("*.parquet")).read_bytes()
 
 
 def _latest_again(path: str, log: Log, fault: str, sources: Rows) -> list[str]:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import platform
 import sys
-import tempfile
 from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
@@ -118,10 +117,12 @@ def _database() -> None:
 
     from ident.database.store import commit
     from sim.boat.database import column_order, column_type, digest, read_rows
+    from sim.files.temporary import temporary_folder
 
     cells = {"double": 0.1, "int64": 1, "string": "x"}
     rows = pd.DataFrame([{c: cells[column_type(c)] for c in column_order()}])
-    with tempfile.TemporaryDirectory() as folder:
+    with temporary_folder() as place:
+        folder = str(place)
         for factor in (1.0, 2.0):
             commit(folder, rows.assign(value=factor), {"message": "self-test"})
         for number, factor in enumerate((1.0, 2.0)):

@@ -7,7 +7,6 @@ import logging
 import os
 import shutil
 import subprocess
-import tempfile
 import zipfile
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,6 +19,7 @@ from ident.exports.xml_text import xml_text
 from ident.output import whole
 from ident.validation.boats import Boat
 from sim.files.errors import InputError
+from sim.files.temporary import temporary_folder
 from sim.flight.case import Case
 
 # First value references.
@@ -123,9 +123,9 @@ def compiled(texts: dict[str, str]) -> bytes:
     compiler = shutil.which(command)
     if compiler is None:
         raise InputError("the C compiler", f"{command} is not there", "a C compiler, named by the variable CC")
-    with tempfile.TemporaryDirectory() as folder:
+    with temporary_folder() as folder:
         for name, text in texts.items():
-            (Path(folder) / name).write_text(text, encoding="utf-8")
+            (folder / name).write_text(text, encoding="utf-8")
         names = [name for name in texts if name.endswith(".c")]
         done = subprocess.run(
             [compiler, "-std=c99", "-O2", "-fPIC", "-shared", "-o", "boat.so", *names, "-lm"],
@@ -137,7 +137,7 @@ def compiled(texts: dict[str, str]) -> bytes:
         if done.returncode:
             raise InputError(f"the C compiler {compiler}", done.stderr.strip()[-500:], "a compiler of C99")
         _log.info("compiled", extra={"compiler": compiler, "files": " ".join(names)})
-        return (Path(folder) / "boat.so").read_bytes()
+        return (folder / "boat.so").read_bytes()
 
 
 def _variables(source: Source) -> list[_Variable]:

@@ -7,7 +7,7 @@ from importlib.resources import files
 from importlib.resources.abc import Traversable
 from pathlib import Path
 
-from ident.output import check_folder, whole
+from ident.output import check_folder, is_left, whole
 from sim.files.errors import InputError
 
 
@@ -22,6 +22,14 @@ def _every(folder: Traversable, place: Path) -> list[tuple[Path, Traversable]]:
     return files
 
 
+def _is_begun(place: Path, every: dict[Path, Traversable]) -> bool:
+    """Whether a folder holds a part of the starter files as they are, as a command that was killed leaves it."""
+    there = [p for p in place.rglob("*") if not p.is_dir()]
+    done = [p for p in there if p in every and p.read_bytes() == every[p].read_bytes()]
+    left = [p for p in there if is_left(p)]
+    return len(done) < len(every) and len(done) + len(left) == len(there)
+
+
 def write_starter(folder: str | os.PathLike[str]) -> tuple[Path, ...]:
     """Write a commented boat, campaign, case, trial and calibration, to be changed into your own.
 
@@ -30,7 +38,7 @@ def write_starter(folder: str | os.PathLike[str]) -> tuple[Path, ...]:
 
     Parameters
     ----------
-    folder : New or empty folder.
+    folder : New or empty folder, or one that a killed ``ident new`` began.
 
     Returns
     -------
@@ -53,10 +61,11 @@ def write_starter(folder: str | os.PathLike[str]) -> tuple[Path, ...]:
     """
     place = Path(folder)
     check_folder(place)
-    if place.is_dir() and any(place.iterdir()):
+    every = _every(files("ident") / "starter" / "files", place)
+    if place.is_dir() and any(place.iterdir()) and not _is_begun(place, dict(every)):
         raise InputError(str(place), "a folder that is not empty", "a new or empty folder: nothing is overwritten")
     written = []
-    for path, source in _every(files("ident") / "starter" / "files", place):
+    for path, source in every:
         with whole(path) as part:
             part.write_bytes(source.read_bytes())
         written.append(path)

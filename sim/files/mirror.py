@@ -7,33 +7,18 @@ the database in the order in which a commit is safe: data, then the entry of the
 
 from __future__ import annotations
 
-import atexit
 import contextlib
 import os
-import platform
 import shutil
-import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
+from sim.files.temporary import folder_of_process, take_place, temporary_folder
+
 LOG = "_delta_log"
-_PREFIX = f"ident-{platform.node().replace('/', '_')}-"
 
 # Folder -> its mirror, of this process.
 _mirrors: dict[tuple[int, str], Path] = {}
-
-
-def is_alive(process: int) -> bool:
-    """Whether a process of this machine runs; where that cannot be asked, it is taken to."""
-    if os.name != "posix":
-        return True
-    try:
-        os.kill(process, 0)
-    except ProcessLookupError:
-        return False
-    except (OSError, OverflowError):
-        return True
-    return True
 
 
 def mirrored(real: Path) -> Path:
@@ -50,7 +35,7 @@ def mirrored(real: Path) -> Path:
     """
     key = (os.getpid(), os.fspath(real))
     if key not in _mirrors or not _mirrors[key].is_dir():
-        _mirrors[key] = _made()
+        _mirrors[key] = folder_of_process()
     _linked(real, _mirrors[key])
     return _mirrors[key]
 
@@ -66,41 +51,11 @@ def handed_over(real: Path) -> Iterator[Path]:
     FileExistsError
         When another writer made the entry of the log meanwhile.
     """
-    mirror = _made()
-    try:
+    with temporary_folder() as mirror:
         _linked(real, mirror)
         yield mirror
         for name in _in_order(mirror):
             _hand(mirror / name, real / name, only_once=name.startswith(f"{LOG}/") and name.endswith(".json"))
-    finally:
-        shutil.rmtree(mirror, ignore_errors=True)
-
-
-def _made() -> Path:
-    _remove_left()
-    made = Path(os.path.realpath(tempfile.mkdtemp(prefix=f"{_PREFIX}{os.getpid()}-")))
-    atexit.register(_removed_by, os.getpid(), made)
-    return made
-
-
-def _removed_by(process: int, mirror: Path) -> None:
-    # A process that was forked has its parent's list.
-    if os.getpid() == process:
-        shutil.rmtree(mirror, ignore_errors=True)
-
-
-def _remove_left() -> None:
-    """Remove mirrors of killed processes of this user; they hold links and unfinished files only."""
-    if os.name != "posix":
-        return
-    with contextlib.suppress(OSError):
-        for entry in os.scandir(tempfile.gettempdir()):
-            process = entry.name.removeprefix(_PREFIX).partition("-")[0]
-            if not (entry.name.startswith(_PREFIX) and process.isdecimal()):
-                continue
-            ours = entry.is_dir(follow_symlinks=False) and entry.stat(follow_symlinks=False).st_uid == os.getuid()
-            if ours and not is_alive(int(process)):
-                shutil.rmtree(entry.path, ignore_errors=True)
 
 
 def _linked(real: Path, mirror: Path) -> None:
@@ -145,6 +100,6 @@ def _hand(new: Path, target: Path, only_once: bool) -> None:
         if only_once:
             os.link(half, target)
         else:
-            half.replace(target)
+            take_place(half, target)
     finally:
         half.unlink(missing_ok=True)

@@ -11,6 +11,7 @@ from typing import Any
 
 from sim.files.errors import InputError
 from sim.files.mirror import handed_over, mirrored
+from sim.files.temporary import take_place
 
 
 def is_url(path: str) -> bool:
@@ -212,7 +213,7 @@ class Storage:
                 try:
                     part.write_bytes(content)
                     flush(part)
-                    part.replace(target)
+                    take_place(part, target)
                 finally:
                     part.unlink(missing_ok=True)
                 flush(target.parent)
@@ -234,9 +235,11 @@ class Storage:
 def flush(path: Path) -> None:
     """Hand a file or folder over to the disk; returns when it is there."""
     # Folders cannot be opened on Windows, which flushes their entries with the file.
-    if path.is_dir() and not hasattr(os, "O_DIRECTORY"):
+    posix = hasattr(os, "O_DIRECTORY")
+    if path.is_dir() and not posix:
         return
-    handle = os.open(path, os.O_RDONLY)
+    # Windows flushes only what was opened to be written.
+    handle = os.open(path, os.O_RDONLY if posix else os.O_RDWR)
     try:
         os.fsync(handle)
     finally:
