@@ -28,11 +28,21 @@ Tell = Callable[[str, int, int], None]
 
 # Folders may be shared with other machines, whose processes this one does not see.
 _HOST = platform.node().replace("/", "_")
+_WORKSHOP = "unfinished"
 _HALF = re.compile(rf"\..*\.{re.escape(_HOST)}\.(\d+)(?:\.[^.]*)?")
 
 
 def silent(what: str, done: int, of: int) -> None:
     """A ``Tell`` that nobody listens to."""
+
+
+def refuse_database(path: Path) -> None:
+    """Refuse a place inside of a database, whose files are its own. Raises ``InputError``."""
+    from sim.files.errors import InputError
+
+    target = Path(os.path.realpath(path))
+    if any((above / "_delta_log").is_dir() for above in (target, *target.parents)):
+        raise InputError(str(path), "a place inside the database", "a file or folder outside of it")
 
 
 def check_folder(path: Path) -> None:
@@ -177,6 +187,7 @@ def whole(path: Path) -> Iterator[Path]:
 
     if inputs.is_read(path):
         raise InputError(str(path), "an input of this command", "another file to write to")
+    refuse_database(path)
     with _as_message(path):
         if _stream_of(path) is not None or _is_fed(path):
             with temporary_folder() as folder:
@@ -197,6 +208,39 @@ def whole(path: Path) -> Iterator[Path]:
         finally:
             with contextlib.suppress(OSError):
                 part.unlink()
+
+
+@contextlib.contextmanager
+def workshop(folder: Path) -> Iterator[Path]:
+    """A hidden folder inside of one that is being filled, for parts of it that are folders; removed at the end.
+
+    One that a killed command left says that the folder was not finished (``is_begun``), and is removed.
+
+    Raises
+    ------
+    sim.files.errors.InputError
+        When it cannot be made.
+    """
+    with _as_message(folder):
+        folder.mkdir(parents=True, exist_ok=True)
+        for left in _left_in(folder):
+            shutil.rmtree(left, ignore_errors=True)
+        place = folder / f".{_WORKSHOP}.{_HOST}.{os.getpid()}"
+        place.mkdir()
+    try:
+        yield place
+    finally:
+        shutil.rmtree(place, ignore_errors=True)
+
+
+def is_begun(folder: Path) -> bool:
+    """Whether a command was killed while it filled a folder."""
+    return any(_left_in(folder))
+
+
+def _left_in(folder: Path) -> list[Path]:
+    hidden = folder.glob(f".{_WORKSHOP}.*") if folder.is_dir() else ()
+    return [p for p in hidden if p.is_dir() and not p.is_symlink() and is_left(p)]
 
 
 class Results(tuple[T, ...]):

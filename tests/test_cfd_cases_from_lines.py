@@ -285,6 +285,36 @@ def test_an_oscillating_mesh_gives_added_mass_about_the_moving_origin(tmp_path):
         assert values[name] == pytest.approx(value, rel=2e-3), name
 
 
+def test_a_matrix_that_a_killed_command_began_is_finished(tmp_path, monkeypatch):
+    """Cases are whole folders; what says that the matrix was not finished goes with the command that finishes it."""
+    folder = write_files(tmp_path / "lines")
+    out = folder / "cases"
+    given = (folder / "captive", folder / "hull.stl", folder / "template.toml", out, 0.1, folder / "facility.toml")
+
+    def killed(*_: object) -> None:
+        # As a kill does: nothing of this process is removed.
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr("ident.cfd.matrix.write_campaign", killed)
+        patch.setattr("ident.output.shutil.rmtree", lambda *_, **__: None)
+        with pytest.raises(KeyboardInterrupt):
+            ident.plan_cases(*given)
+    (left,) = out.glob(".unfinished.*")
+    with pytest.raises(ident.InputError, match="not empty"):
+        ident.plan_cases(*given)
+    left.rename(left.with_suffix(f".{2**22 + 1}"))
+    next(out.glob("cases/*/*")).joinpath("half").write_text("half")
+    made = ident.plan_cases(*given).matrix
+    assert not list(out.glob(".*"))
+    assert not list(out.rglob("half"))
+    assert (out / "campaign.toml").is_file()
+    for case in made.cases:
+        for grid in case.grids:
+            assert (out / "cases" / case.run_id / grid / "Allrun").is_file(), (case.run_id, grid)
+            assert (out / "meshes" / case.mesh / grid / "Allmesh").is_file()
+
+
 # -- what is said before a case is written -----------------------------------------------------------
 
 

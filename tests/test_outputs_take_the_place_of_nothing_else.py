@@ -12,6 +12,7 @@ import subprocess
 import sys
 import tempfile
 import threading
+from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
@@ -162,6 +163,39 @@ def test_a_case_and_the_vehicle_it_names_are_inputs(tmp_path, fitted_db):
         assert done.exit_code == 2
         assert "input of this command" in done.output or "inside the database" in done.output
     assert case.read_text() == 'vehicle = "boat.toml"'
+
+
+# What a command needs before the last word names where it writes.
+WRITES = [
+    *(
+        "animate --case hzz20 --out",
+        "fly --case hzz20 --out",
+        "diff 0 1 --figure",
+        "export",
+        "export --format c",
+        "new",
+    ),
+    *("offsets x.stl --unit m --length 4 --out", "plan c", "plan c --out", "report --out", "runs c --out"),
+    *("stability --out", "trial t.csv --out", "trial t.csv --figures", "validate --case hzz20 --out"),
+]
+WRITES_JSON = ["animate --case hzz20", "calibrate bb2", "check c", "diff 0 1", "doctor", "export out", "fit c"]
+WRITES_JSON += ["fly --case hzz20", "import x.json", "new boat", "offsets x.stl --unit m --length 4 --out o", "plan c"]
+WRITES_JSON += ["report", "runs c", "schema case", "stability", "trial t.csv", "vacuum", "validate --all", "versions"]
+
+
+def test_no_command_writes_into_a_database(tmp_path, monkeypatch, fitted_db):
+    """Its own, another, or one deep below."""
+    monkeypatch.chdir(tmp_path)
+    assert {line.split()[0] for line in WRITES_JSON} == set(main.commands)
+    held = [p for p in Path(fitted_db).rglob("*") if p.is_file()]
+    before = {p: p.read_bytes() for p in held}
+    log = f"{fitted_db}/_delta_log/00000000000000000000.json"
+    for line in [*WRITES, *(f"{line} --json" for line in WRITES_JSON)]:
+        for place in (log, f"{fitted_db}/deep/x") if line.endswith("--json") else (f"{fitted_db}/x.svg",):
+            done = run(*line.split(), place)
+            assert (done.exit_code, "inside the database" in done.output) == (2, True), (line, done.output)
+    assert {p: p.read_bytes() for p in Path(fitted_db).rglob("*") if p.is_file()} == before
+    assert not list(tmp_path.iterdir())
 
 
 def test_files_read_on_the_way_are_not_written_over(tmp_path):

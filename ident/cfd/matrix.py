@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import os
+import shutil
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
@@ -23,7 +24,7 @@ from ident.cfd.motions import UNWRITTEN, Motion, motion_of
 from ident.cfd.sources import write_campaign
 from ident.cfd.surfaces import Lines, turned
 from ident.cfd.template import Template
-from ident.output import Tell, check_folder, silent, whole
+from ident.output import Tell, check_folder, is_begun, silent, whole, workshop
 from sim.boat.vehicle import Vehicle
 from sim.files.errors import InputError
 
@@ -121,22 +122,23 @@ def write_matrix(
         motion that a case cannot have. Nothing is written then.
     """
     check_folder(out)
-    if out.is_dir() and any(out.iterdir()) and not is_matrix(out):
+    if out.is_dir() and any(out.iterdir()) and not is_matrix(out) and not is_begun(out):
         raise InputError(str(out), "a folder that is not empty", "a new folder, or one that ident plan --cases wrote")
     matrix = read_matrix(out) if is_matrix(out) else Matrix(out)
     planned = _prepared(runs, vehicle, lines, template, matrix, where)
-    _write_folders(planned, template, out, tell)
-    matrix.cases += [one.case for one in planned]
-    matrix.new = [one.case.run_id for one in planned]
-    _write_scripts(out, matrix, template)
-    write_campaign(out, matrix.cases, vehicle, vehicle_file, template)
-    with whole(out / MATRIX) as part:
-        part.write_text(json.dumps(matrix.to_dict(), indent=1) + "\n", encoding="utf-8")
+    with workshop(out) as place:
+        _write_folders(planned, template, out, place, tell)
+        matrix.cases += [one.case for one in planned]
+        matrix.new = [one.case.run_id for one in planned]
+        _write_scripts(out, matrix, template)
+        write_campaign(out, matrix.cases, vehicle, vehicle_file, template)
+        with whole(out / MATRIX) as part:
+            part.write_text(json.dumps(matrix.to_dict(), indent=1) + "\n", encoding="utf-8")
     return matrix
 
 
-def _write_folders(planned: list[_Written], template: Template, out: Path, tell: Tell) -> None:
-    """A folder for each mesh that is not there yet, and one for every case and grid."""
+def _write_folders(planned: list[_Written], template: Template, out: Path, place: Path, tell: Tell) -> None:
+    """A folder for each mesh that is not there yet, and one for every case and grid: whole, from ``place``."""
     meshes: dict[str, Body] = {}
     for one in planned:
         meshes.setdefault(one.case.mesh, one.body)
@@ -144,16 +146,26 @@ def _write_folders(planned: list[_Written], template: Template, out: Path, tell:
     for done, (name, body) in enumerate(meshes.items()):
         tell("writing meshes", done, len(meshes))
         for grid in names:
-            folder = out / "meshes" / name / grid
-            if not (folder / "Allmesh").is_file():
-                write_mesh(folder, body, template, grid)
+            below = Path("meshes") / name / grid
+            if not (out / below / "Allmesh").is_file():
+                write_mesh(place / below, body, template, grid)
+                _moved(place / below, out / below)
     for done, one in enumerate(planned):
         tell("writing cases", done, len(planned))
         for grid in names:
-            folder, mesh = out / "cases" / one.case.run_id / grid, out / "meshes" / one.case.mesh / grid
+            below, mesh = Path("cases") / one.case.run_id / grid, place / "meshes" / one.case.mesh / grid
             wall = wall_cell(template, one.body.length, grid)
-            write_case(folder, mesh, one.motion, one.body, template, one.centre, one.speed, wall)
+            write_case(place / below, mesh, one.motion, one.body, template, one.centre, one.speed, wall)
+            _moved(place / below, out / below)
     tell("writing cases", len(planned), len(planned))
+
+
+def _moved(made: Path, target: Path) -> None:
+    """A finished folder takes its place, and that of one which a killed command left there: no matrix names it."""
+    if target.exists():
+        shutil.rmtree(target)
+    target.parent.mkdir(parents=True, exist_ok=True)
+    made.rename(target)
 
 
 def _prepared(

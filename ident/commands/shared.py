@@ -43,6 +43,11 @@ def _folder(context: click.Context, parameter: click.Parameter, value: Path) -> 
     return value
 
 
+def either(context: click.Context, parameter: click.Parameter, value: Any) -> Any:
+    """Marks what is written to, a file or a folder by what else is asked; the command looks at it then."""
+    return value
+
+
 def _file(context: click.Context, parameter: click.Parameter, value: Any) -> Any:
     from ident.output import check_file
 
@@ -74,22 +79,21 @@ def _inputs(command: click.Command, values: dict[str, Any]) -> list[Path]:
 
 
 def _is_written(parameter: click.Parameter) -> bool:
-    return parameter.callback in (_file, _folder, _drawing)
+    return parameter.callback in (_file, _folder, _drawing, either)
 
 
 def _refuse_inputs(command: click.Command, values: dict[str, Any]) -> None:
     """Refuse to write over what a command reads. Raises ``InputError``."""
+    from ident.output import refuse_database
     from sim.files.errors import InputError
 
     inputs = _inputs(command, values)
-    database = Path(os.path.realpath(values["db"])) if values.get("db") and "://" not in values["db"] else None
     for parameter in command.params:
         given = values.get(parameter.name or "")
         if not _is_written(parameter) or given in (None, "-"):
             continue
         target = Path(os.path.realpath(given))
-        if database and (target == database or database in target.parents):
-            raise InputError(str(given), "a place inside the database", "a file or folder outside of it")
+        refuse_database(target)
         if parameter.callback is _folder or not target.is_file():
             continue
         for one in inputs:

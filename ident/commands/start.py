@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from ident.commands.shared import FOLDER, emit, json_to
+from ident.commands.shared import FOLDER, either, emit, json_to
 
 
 @click.command()
@@ -54,7 +54,11 @@ def schema(kind: str, json_path: str | None) -> None:
 @click.option("--z", type=click.Choice(["up", "down"]), default="up", show_default=True, help="Where z points.")
 @click.option("--axis", type=float, default=0.0, show_default=True, help="z of the hull's axis, in the unit.")
 @click.option(
-    "--out", type=click.Path(path_type=Path), required=True, help="Folder for hull.toml and hull_offsets.csv."
+    "--out",
+    type=click.Path(path_type=Path),
+    required=True,
+    callback=either,
+    help="Folder for hull.toml and hull_offsets.csv.",
 )
 @json_to("Write the offsets as JSON.")
 def offsets(

@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from ident.commands.shared import console_for, emit, json_to, out_file
+from ident.commands.shared import console_for, either, emit, json_to, out_file
 from ident.text import on_screen
 
 
@@ -19,7 +19,13 @@ from ident.text import on_screen
 @click.option(
     "--length", "length", type=click.FloatRange(min=0, min_open=True), default=None, help="L [m], full scale."
 )
-@click.option("--figures", type=click.Path(path_type=Path), default=None, help="Folder for the plots of the report.")
+@click.option(
+    "--figures",
+    type=click.Path(path_type=Path),
+    default=None,
+    callback=either,
+    help="Folder for the plots of the report.",
+)
 @out_file("Write the metrics as CSV.")
 @json_to("Write maneuver, assumptions, metrics with standard errors and findings.")
 def trial(

@@ -151,8 +151,8 @@ def loads_figure(table: pd.DataFrame, path: Path, most: int = 8) -> Path:
         ax.legend(frameon=False, fontsize=6, ncols=2)
     for ax in axes[2::3]:
         ax.set_xlabel("t [s]")
-    path.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(path, dpi=150)
+    with whole(path) as part:
+        figure.savefig(part, dpi=150)
     return path
 
 
@@ -166,9 +166,9 @@ def write_loads(done: Validation, by: str, folder: Path) -> tuple[pd.DataFrame, 
     folder : Where files go.
     """
     table = loads_by_part(done.case, done.boat, done.simulation, by)
-    stem = folder / f"{in_file_name(done.case.name)}_v{done.version}_loads"
-    folder.mkdir(parents=True, exist_ok=True)
-    data = stem.with_suffix(".csv")
+    # A name may have points, after which no suffix begins.
+    stem = f"{in_file_name(done.case.name)}_v{done.version}_loads"
+    data = folder / f"{stem}.csv"
     with whole(data) as part:
         table.to_csv(part, index=False)
-    return table, data, loads_figure(table, stem.with_suffix(".png"))
+    return table, data, loads_figure(table, folder / f"{stem}.png")

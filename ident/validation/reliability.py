@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ident.metrics.metric import Interval, Metric, Metrics
+from ident.output import whole
 from ident.validation.bands import LEVELS, Bands
 from sim.flight.case import Case
 from sim.flight.series import Series
@@ -160,6 +161,6 @@ def reliability_figure(points: list[Reliability], path: Path) -> Path:
         xlabel="level of the band", ylabel="share of the references inside", xlim=(0, 1), ylim=(0, 1), aspect="equal"
     )
     ax.legend(frameon=False)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(path, dpi=150)
+    with whole(path) as part:
+        figure.savefig(part, dpi=150)
     return path
