@@ -53,7 +53,7 @@ if TYPE_CHECKING:
     from sim.flight.plant import Plant
     from sim.flight.sensors import Sensors
     from sim.flight.series import Series
-    from sim.flight.simulate import Simulation
+    from sim.flight.simulation import Simulation
     from sim.flight.trim import NoEquilibrium, Trim
 
 __version__ = "0.1.0"
@@ -88,7 +88,7 @@ _PLACES = {
     "Calibrated": "ident.calibration.result",
     "Validation": "ident.validation.result",
     "ChannelError": "ident.validation.result",
-    "Simulation": "sim.flight.simulate",
+    "Simulation": "sim.flight.simulation",
     "StabilityMap": "ident.analysis.result",
     "Stability": "ident.analysis.result",
     "Linear": "ident.analysis.result",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sim.flight.simulate import Simulation
+from sim.flight.simulation import Simulation
 
 
 def made_flight(time: np.ndarray, **columns: np.ndarray) -> Simulation:

@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from ident.validation.boats import Boat, Fleet
     from sim.boat.vehicle import Vehicle
     from sim.flight.case import Case
-    from sim.flight.simulate import Simulation
+    from sim.flight.simulation import Simulation
     from sim.kernel.layout import Model
     from sim.waves.in_waves import Water
 

@@ -25,7 +25,8 @@ from ident.trials.trial import measure_trial
 from sim.boat.coefficients import Coefficients
 from sim.flight.case import load_case
 from sim.flight.series import load_reference
-from sim.flight.simulate import Simulation, simulate
+from sim.flight.simulate import simulate
+from sim.flight.simulation import Simulation
 
 # Standard errors of a sample: a good gyro, log, depth gauge, satellite position and transducers.
 NOISE = {"psi [deg]": 0.05, "r [deg/s]": 0.005, "phi [deg]": 0.02, "theta [deg]": 0.02, "u [m/s]": 0.01}

@@ -17,7 +17,7 @@ from ident.output import whole
 from ident.text import in_figure
 from ident.validation.figures import FRAME, readable
 from sim.files.errors import InputError
-from sim.flight.simulate import Simulation
+from sim.flight.simulation import Simulation
 from sim.waves.linear import Waves, kinematics, mean_direction
 
 if TYPE_CHECKING:

@@ -20,7 +20,8 @@ from sim.files.record import Record
 from sim.flight.case import Case, load_case
 from sim.flight.craft import Craft
 from sim.flight.series import Series
-from sim.flight.simulate import Simulation, equipped, fly
+from sim.flight.simulate import equipped, fly
+from sim.flight.simulation import Simulation
 from sim.flight.trim import NoEquilibrium
 
 Array = NDArray[np.float64]

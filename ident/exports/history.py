@@ -19,7 +19,7 @@ from sim.boat.vehicle import Vehicle
 from sim.files.errors import InputError
 from sim.files.frames import PROGRAM
 from sim.flight.case import Case
-from sim.flight.simulate import CHANNELS, Simulation
+from sim.flight.simulation import CHANNELS, Simulation
 from sim.waves.linear import kinematics
 
 if TYPE_CHECKING:

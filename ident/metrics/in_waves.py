@@ -14,7 +14,7 @@ from ident.metrics.exceedance import exceedances, extreme
 from ident.metrics.seakeeping import Harmonics, as_published
 from ident.metrics.seaway import Statistics
 from sim.flight.case import Case
-from sim.flight.simulate import Simulation
+from sim.flight.simulation import Simulation
 from sim.waves.linear import mean_direction
 
 Array = NDArray[np.float64]

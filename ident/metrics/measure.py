@@ -18,7 +18,7 @@ from ident.metrics.zigzag import roll_decay, zigzag
 from sim.flight.case import Case
 from sim.flight.maneuver import CONTROLS, STATE
 from sim.flight.series import Series
-from sim.flight.simulate import Simulation
+from sim.flight.simulation import Simulation
 
 Array = NDArray[np.float64]
 Channels = dict[str, Array]

@@ -25,7 +25,7 @@ from ident.timeseries import blocks as condense
 from ident.timeseries.reduction import Fitted, fit_history
 from ident.timeseries.regression import least_squares
 from sim.files.errors import InputError
-from sim.flight.simulate import CHANNELS, DERIVED, Simulation
+from sim.flight.simulation import CHANNELS, DERIVED, Simulation
 from sim.waves.linear import Waves
 
 Array = NDArray[np.float64]

@@ -20,7 +20,7 @@ from ident.metrics.seakeeping import channel_unit, check_channels, drift_columns
 from ident.timeseries import blocks as condense
 from ident.timeseries import reduction
 from sim.files.errors import InputError
-from sim.flight.simulate import Simulation
+from sim.flight.simulation import Simulation
 from sim.waves.linear import Waves, kinematics
 
 Array = NDArray[np.float64]

@@ -28,7 +28,8 @@ from sim.files.errors import InputError
 from sim.flight.case import Case
 from sim.flight.craft import Craft
 from sim.flight.series import Series
-from sim.flight.simulate import DERIVED, columns_of, equipped, fly, samples_of, uses_tanks
+from sim.flight.simulate import columns_of, equipped, fly, samples_of, uses_tanks
+from sim.flight.simulation import DERIVED
 from sim.flight.trim import NoEquilibrium
 from sim.kernel.assemble import Assembly
 from sim.waves.in_waves import Water

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from sim.boat.catalogue import feature_index
 from sim.boat.coefficients import Coefficient, Coefficients
 from sim.flight.maneuver import COMMANDED, CONTROLS, STATE
-from sim.flight.simulate import Simulation
+from sim.flight.simulation import Simulation
 from sim.kernel import rhs as kernel
 from sim.kernel.layout import Model, workspace
 

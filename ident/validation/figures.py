@@ -16,7 +16,7 @@ from ident.validation.bands import Bands
 from ident.validation.result import Validation
 from sim.boat.database import version_words
 from sim.files.record import Record
-from sim.flight.simulate import CHANNELS, Simulation
+from sim.flight.simulation import CHANNELS, Simulation
 
 Array = NDArray[np.float64]
 FRAME = "frame: x forward, y starboard, z down; psi and r positive to starboard"

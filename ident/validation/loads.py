@@ -22,7 +22,8 @@ from sim.boat.mass import cross_matrix
 from sim.files.errors import InputError
 from sim.flight.case import Case
 from sim.flight.maneuver import CONTROLS, STATE, TIME
-from sim.flight.simulate import Simulation, begun, environment_of, uses_tanks
+from sim.flight.simulate import begun, environment_of, uses_tanks
+from sim.flight.simulation import Simulation
 from sim.kernel import rhs as kernel
 from sim.kernel.assemble import assemble
 from sim.kernel.layout import workspace

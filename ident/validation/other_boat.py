@@ -19,7 +19,8 @@ from sim.files.errors import InputError
 from sim.files.toml_files import bundled
 from sim.flight.case import Case
 from sim.flight.commands import Commands, Event
-from sim.flight.simulate import Simulation, mixer_of
+from sim.flight.simulate import mixer_of
+from sim.flight.simulation import Simulation
 
 # Powers of the ratio of lengths of what an event watches: a rate of change per second of it.
 _LENGTHS = {"D0": 1.0, "z": 1.0, "x": 1.0, "y": 1.0, "point_depth": 1.0, "u": 0.5, "v": 0.5, "w": 0.5, "U": 0.5}

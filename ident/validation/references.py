@@ -11,7 +11,7 @@ from ident.timeseries.neighbours import far_from_neighbours
 from sim.files.errors import InputError
 from sim.flight.case import Case
 from sim.flight.series import Series
-from sim.flight.simulate import CHANNELS, Simulation
+from sim.flight.simulation import CHANNELS, Simulation
 
 Array = NDArray[np.float64]
 # A reference over a smaller part of the run than this is of another unit of time, or of another run.

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from ident.validation.sweep import SweepPoint
     from sim.flight.case import Case
     from sim.flight.series import Series
-    from sim.flight.simulate import Simulation
+    from sim.flight.simulation import Simulation
 
 
 @dataclass(frozen=True)

@@ -24,7 +24,7 @@ from sim.flight.commands import Event, PlaneCommand, PlaneStep, SpeedCommand, Sp
 from sim.flight.reference import Reference, Start
 from sim.flight.reference_table import is_series
 from sim.flight.series import Series, load_reference
-from sim.flight.simulate import CHANNELS
+from sim.flight.simulation import CHANNELS
 
 if TYPE_CHECKING:
     from ident.timeseries.smoothing import SmoothPath

@@ -13,7 +13,7 @@ from ident.text import in_file_name
 from ident.validation.figures import DOWNWARDS, blank, dress, finish, readable
 from ident.validation.result import Validation
 from sim.boat.database import version_words
-from sim.flight.simulate import Simulation
+from sim.flight.simulation import Simulation
 from sim.waves.linear import mean_direction
 
 Array = NDArray[np.float64]

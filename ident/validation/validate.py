@@ -31,7 +31,8 @@ from sim.flight.case import Case, load_case
 from sim.flight.reference import Reference
 from sim.flight.reference_table import is_series
 from sim.flight.series import Series, read_series
-from sim.flight.simulate import CHANNELS, Simulation, fly
+from sim.flight.simulate import fly
+from sim.flight.simulation import CHANNELS, Simulation
 
 Array = NDArray[np.float64]
 _log = logging.getLogger(__name__)

@@ -16,7 +16,7 @@ from ident.metrics.seakeeping import Harmonics, as_published
 from ident.metrics.seaway import Statistics, spectrum, uniform_step
 from ident.text import in_figure
 from ident.validation.figures import DOWNWARDS, blank, dress, finish, readable
-from sim.flight.simulate import Simulation
+from sim.flight.simulation import Simulation
 
 Array = NDArray[np.float64]
 

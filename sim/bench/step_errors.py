@@ -19,7 +19,8 @@ import numpy as np
 from sim.bench.boat import frozen_boat
 from sim.boat.coefficients import Coefficients
 from sim.flight.case import Case, load_case
-from sim.flight.simulate import Simulation, simulate
+from sim.flight.simulate import simulate
+from sim.flight.simulation import Simulation
 from sim.flight.trim import NoEquilibrium
 
 _FILE = Path(__file__).with_name("step_errors.csv")

@@ -7,7 +7,8 @@ from threading import RLock
 from sim.boat.coefficients import Coefficients
 from sim.boat.mass import Environment
 from sim.flight.case import Case
-from sim.flight.simulate import Simulation, environment_of, equipped, fly, water_of
+from sim.flight.simulate import environment_of, equipped, fly, water_of
+from sim.flight.simulation import Simulation
 from sim.kernel.assemble import Assembly, assemble
 from sim.kernel.layout import Model
 from sim.waves.in_waves import Water

@@ -16,7 +16,8 @@ from sim.flight import maneuver, orders
 from sim.flight.case import Case, load_case
 from sim.flight.commands import Commands, PlaneCommand, SpeedCommand
 from sim.flight.craft import Craft
-from sim.flight.simulate import TANKS, begun, columns_of, uses_tanks
+from sim.flight.simulate import begun, columns_of, uses_tanks
+from sim.flight.simulation import TANKS
 from sim.kernel.assemble import without_thrust
 from sim.kernel.layout import OUTSIDE, Model, workspace
 from sim.waves.in_waves import phases_of, surroundings, with_phases
