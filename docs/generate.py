@@ -225,7 +225,7 @@ def main() -> int:
             ident.calibrate("bb2", db)
             board = ident.scoreboard(db)
             main_case = next(one for one in board.flown if one.case.name == CASE)
-            case_figure(main_case, ROOT / "docs" / f"{CASE}.png")
+            case_figure(main_case.flown, ROOT / "docs" / f"{CASE}.png")
             readme["accuracy"] = accuracy(board)
             boats["predictions"] = evidence.predictions(db)
     wanted = {

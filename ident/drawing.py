@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import contextlib
 import functools
+import importlib
 import logging
 import multiprocessing
 import os
@@ -17,9 +18,13 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Generic, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, TypeVar, cast
+
+from sim.files import inputs
 
 if TYPE_CHECKING:
+    from multiprocessing.connection import Connection
+
     from matplotlib.axes import Axes
     from matplotlib.axis import Axis
     from matplotlib.figure import Figure
@@ -127,8 +132,6 @@ def _end_with_parent() -> None:
 
 def _ready(read: Iterable[Path] | None) -> None:
     """A process that draws: what the command has read it does not write over; it ends when the command does."""
-    from sim.files import inputs
-
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with_parent, daemon=True).start()
     if read is not None:
@@ -148,6 +151,69 @@ def _unheard() -> Iterator[None]:
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def _here(draw: Callable[..., T], *job: Any) -> T:
+    return draw(*job)
+
+
+def _draw_what_comes(jobs: Connection, modules: Sequence[str]) -> None:
+    """Of a process started ahead: import what draws, then draw what is sent, until nothing more comes."""
+    _ready(None)
+    for module in modules:
+        importlib.import_module(module)
+    with contextlib.suppress(EOFError, OSError):
+        while True:
+            read, draw, job = jobs.recv()
+            inputs.begin(read or ())
+            try:
+                drawn = draw(*job)
+            except Exception as error:
+                drawn = error
+            jobs.send(drawn)
+
+
+@contextlib.contextmanager
+def ahead(*modules: str) -> Iterator[Callable[..., Any]]:
+    """A process that has imported what draws by the time there is something to draw.
+
+    Matplotlib takes longer to import than most cases to fly. On one core, and where no process can be started,
+    figures are drawn here, as they are when the process ends before its time.
+
+    Parameters
+    ----------
+    modules : What to import.
+
+    Yields
+    ------
+    ``draw(function, *job)``: the result of ``function(*job)``, raising what that raises.
+    """
+    if cores() < 2:
+        yield _here
+        return
+    context = multiprocessing.get_context("spawn")
+    end, others = context.Pipe()
+    process = context.Process(target=_draw_what_comes, args=(others, modules), daemon=True)
+    with _unheard():
+        process.start()
+    others.close()
+
+    def draw(function: Callable[..., T], *job: Any) -> T:
+        try:
+            end.send((inputs.noted(), function, job))
+            drawn = end.recv()
+        except (EOFError, OSError):
+            _log.warning("the process that draws has ended: what it was to draw is drawn here")
+            return function(*job)
+        if isinstance(drawn, Exception):
+            raise drawn
+        return cast("T", drawn)
+
+    try:
+        yield draw
+    finally:
+        end.close()
+        process.kill()
 
 
 class _Shared(Generic[T]):
@@ -204,8 +270,6 @@ def beside(draw: Callable[..., T], jobs: Sequence[tuple[Any, ...]], workers: int
     -------
     The results, in the order of the jobs.
     """
-    from sim.files import inputs
-
     others = min(workers or cores(), len(jobs) // 2) - 1
     if others < 1 or len(jobs) < _WORTH:
         return [draw(*job) for job in jobs]

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from ident.drawing import beside, scientific
+from ident.drawing import ahead, beside, scientific
 from ident.output import check_folder, whole
 from ident.report.figures import draw_figures, quality_colours
 from sim.boat.vehicle import load_vehicle
@@ -45,6 +45,29 @@ def test_what_a_process_that_ended_had_to_draw_is_drawn_here(caplog, capfd):
     assert beside(dies_elsewhere, jobs, workers=3) == list(range(8))
     assert "a process that draws has ended" in caplog.text
     assert capfd.readouterr().err == ""
+
+
+def test_a_process_made_ready_ahead_draws_and_refuses_as_this_one(tmp_path, monkeypatch):
+    monkeypatch.setattr("ident.drawing.cores", lambda: 2)
+    read = tmp_path / "input.png"
+    read.write_text("", "utf-8")
+    with ahead("json") as draw:
+        inputs.begin([read])
+        try:
+            assert draw(os.getpid) != os.getpid()
+            draw(whole_file, tmp_path / "figure.png")
+            with pytest.raises(InputError, match="an input of this command"):
+                draw(whole_file, read)
+        finally:
+            inputs._read.set(None)
+    assert (tmp_path / "figure.png").read_text("utf-8") == "drawn"
+
+
+def test_what_a_process_made_ready_ahead_did_not_draw_is_drawn_here(caplog, monkeypatch):
+    monkeypatch.setattr("ident.drawing.cores", lambda: 2)
+    with ahead() as draw:
+        assert [draw(dies_elsewhere, os.getpid(), k) for k in range(3)] == [0, 1, 2]
+    assert "the process that draws has ended" in caplog.text
 
 
 def test_another_process_does_not_write_over_what_was_read_either(tmp_path):

@@ -21,7 +21,7 @@ def flown(tmp_path_factory):
 
 
 def test_planes_command_and_check_angles_are_drawn(flown):
-    figure, _ = _draw(flown, None)
+    figure, _ = _draw(flown.flown, None)
     by_label = {axis.get_ylabel(): axis for axis in figure.axes}
     heading = next(axis for label, axis in by_label.items() if label.startswith("heading psi"))
     drawn = [line.get_ydata() for line in heading.lines]
@@ -37,4 +37,4 @@ def test_planes_command_and_check_angles_are_drawn(flown):
 
 @pytest.mark.parametrize(("kind", "head"), [("png", b"\x89PNG"), ("svg", b"<?xml"), ("pdf", b"%PDF")])
 def test_the_suffix_decides_the_format(flown, tmp_path, kind, head):
-    assert case_figure(flown, tmp_path / f"one.{kind}").read_bytes().startswith(head)
+    assert case_figure(flown.flown, tmp_path / f"one.{kind}").read_bytes().startswith(head)

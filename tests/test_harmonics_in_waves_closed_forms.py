@@ -231,7 +231,7 @@ def test_harmonics_over_depth_are_drawn_with_their_reading_errors(tmp_path, monk
         given.append((sorted(flown), reference, words[0]))
         return harmonics_figure(flown, reference, path, *words)
 
-    monkeypatch.setattr("ident.validation.wave_case_figures.harmonics_figure", figure)
+    monkeypatch.setattr("ident.validation.wave_figures.harmonics_figure", figure)
     again = _flown(CASES[0], waves, time)
     files = harmonics_over_depth([*done, again], tmp_path)
     assert [f.name for f in files] == ["harmonics_in_waves_v3.png", "harmonics_in_waves_2_v3.png"]

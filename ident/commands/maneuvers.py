@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 from dataclasses import dataclass
 from functools import partial
@@ -14,7 +15,10 @@ from ident.commands.shared import DB, MESSAGE, OUT, VERSION, WAIT, console_for, 
 from ident.text import on_screen, visible
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from ident.validation.board import Scoreboard
+    from ident.validation.figure_files import Drawn
     from ident.validation.result import Validation
 
 
@@ -164,14 +168,15 @@ def validate(**options: Any) -> None:
     asked = ValidateOptions(**options)
     asked.check()
     console = console_for(quiet=asked.json_path == "-")
-    with equilibrium_of(asked.case or "of --all"):
-        board = _all(asked, console) if asked.every else None
-        done = [_one(asked, console)] if board is None else board.flown
-    if asked.samples:
-        done = _with_bands(done, asked, console)
-        board = board and _board_with_bands(board, done, asked, console)
-    for figure in _figures(done, asked.out, asked.figures):
-        console.print(f"figure: {on_screen(figure)}", highlight=False)
+    with _figures(asked) as figures:
+        with equilibrium_of(asked.case or "of --all"):
+            board = _all(asked, console) if asked.every else None
+            done = [_one(asked, console)] if board is None else board.flown
+        if asked.samples:
+            done = _with_bands(done, asked, console)
+            board = board and _board_with_bands(board, done, asked, console)
+        for figure in figures(done):
+            console.print(f"figure: {on_screen(figure)}", highlight=False)
     if asked.history:
         _histories(done, asked.out, asked.history, console)
     by_source = _loads(done[0], asked.loads, asked.out, console) if asked.loads else {}
@@ -207,13 +212,15 @@ def _histories(done: list[Validation], out: Path, kind: str, console: Any) -> No
             console.print(f"history: {on_screen(path)}", highlight=False)
 
 
-def _figures(done: list[Validation], out: Path, kind: str) -> list[Path]:
-    """The figures of every case; on all cores where there are many."""
-    from ident.drawing import beside
-    from ident.validation.wave_case_figures import figures_of, harmonics_over_depth
+@contextlib.contextmanager
+def _figures(asked: ValidateOptions) -> Iterator[Drawn]:
+    from ident.validation.figure_files import figures_of_many, figures_of_one
 
-    drawn = beside(figures_of, [(one, out, kind) for one in done], workers=0)
-    return [figure for figures in drawn for figure in figures] + harmonics_over_depth(done, out, kind)
+    if asked.every:
+        yield partial(figures_of_many, asked.out, asked.figures)
+        return
+    with figures_of_one(asked.out, asked.figures) as drawn:
+        yield drawn
 
 
 def _one(asked: ValidateOptions, console: Any) -> Validation:

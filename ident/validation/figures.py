@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,11 +12,13 @@ from numpy.typing import NDArray
 from ident.drawing import fixed_labels, margins
 from ident.output import whole
 from ident.text import in_figure
-from ident.validation.bands import Bands
-from ident.validation.result import Validation
 from sim.boat.database import version_words
 from sim.files.record import Record
 from sim.flight.simulation import CHANNELS, Simulation
+
+if TYPE_CHECKING:
+    from ident.validation.bands import Bands
+    from ident.validation.flown_case import FlownCase
 
 Array = NDArray[np.float64]
 FRAME = "frame: x forward, y starboard, z down; psi and r positive to starboard"
@@ -96,13 +98,13 @@ def readable(channel: str, values: Array) -> tuple[Array, str, str]:
     return shown, _LABELS.get(channel, channel.replace("_", " ")), unit
 
 
-def _sources(done: Validation) -> list[str]:
+def _sources(done: FlownCase) -> list[str]:
     reference = done.case.reference
     published = reference.published_model if reference else None
     return [*(reference.compare if reference else []), *([published] if published else [])]
 
 
-def _line(done: Validation, source: str) -> dict[str, Any]:
+def _line(done: FlownCase, source: str) -> dict[str, Any]:
     """How a source is drawn."""
     if done.case.reference and source == done.case.reference.published_model:
         return {"color": "tab:green", "lw": 1.2, "ls": "--", "label": f"published model ({in_figure(source)})"}
@@ -110,7 +112,7 @@ def _line(done: Validation, source: str) -> dict[str, Any]:
     return {"color": colour, "marker": marker, "ms": 2.5, "lw": 0.6, "markevery": 4, "label": in_figure(source)}
 
 
-def _flights(done: Validation) -> list[tuple[Simulation, dict[str, Any]]]:
+def _flights(done: FlownCase) -> list[tuple[Simulation, dict[str, Any]]]:
     main = {"color": "tab:red", "lw": 1.6, "label": "simulated from the database"}
     as_started = [
         (flight, {"color": "tab:orange", "lw": 1.2, "ls": "-.", "label": f"simulated as {in_figure(source)} starts"})
@@ -119,7 +121,7 @@ def _flights(done: Validation) -> list[tuple[Simulation, dict[str, Any]]]:
     return [(done.simulation, main), *as_started]
 
 
-def _series(done: Validation, channel: str, axis: Any, bands: Bands | None) -> None:
+def _series(done: FlownCase, channel: str, axis: Any, bands: Bands | None) -> None:
     """One channel of the references, the bands and the flights over the abscissa."""
     along, unit = done.reference.abscissa, _UNITS[channel]
     for source in _sources(done):
@@ -173,7 +175,7 @@ def dress(axis: Any, x: str, y: str) -> None:
     axis.grid(alpha=0.3)
 
 
-def _track(done: Validation, axis: Any) -> None:
+def _track(done: FlownCase, axis: Any) -> None:
     """The path over ground, north up, both axes to one scale."""
     for source in _sources(done):
         series = done.reference[source]
@@ -185,7 +187,7 @@ def _track(done: Validation, axis: Any) -> None:
     axis.set_aspect("equal", adjustable="datalim")
 
 
-def _checks(done: Validation, channel: str, axis: Any) -> None:
+def _checks(done: FlownCase, channel: str, axis: Any) -> None:
     """The command and the check angles of a zigzag over the angle that it reverses at."""
     command = getattr(done.case.command, _REVERSED_BY.get(channel, ""), None)
     if command is None or command.law != "zigzag":
@@ -199,7 +201,7 @@ def _checks(done: Validation, channel: str, axis: Any) -> None:
     axis.set_title(note, fontsize=8, loc="right")
 
 
-def _deflections(done: Validation, planes: list[str], axis: Any) -> None:
+def _deflections(done: FlownCase, planes: list[str], axis: Any) -> None:
     """Every plane of the main flight."""
     along = done.reference.abscissa
     for plane in planes:
@@ -211,7 +213,7 @@ def _deflections(done: Validation, planes: list[str], axis: Any) -> None:
     axis.legend(loc="upper center", fontsize=7, frameon=False, ncols=_LEGEND_COLUMNS)
 
 
-def _spiral(done: Validation, axis: Any) -> None:
+def _spiral(done: FlownCase, axis: Any) -> None:
     """Steady yaw rate against rudder, in the order flown."""
     curve = done.curve or []
     rudder, rate = [p.dH_deg for p in curve], [p.r_degps for p in curve]
@@ -221,7 +223,7 @@ def _spiral(done: Validation, axis: Any) -> None:
     dress(axis, "horizontal command dH [deg]", "steady yaw rate r [deg/s]")
 
 
-def _grid(done: Validation, axes: Any) -> None:
+def _grid(done: FlownCase, axes: Any) -> None:
     """Self-propulsion over speed, one line a depth."""
     names = {
         "n_rps": "revolutions n [1/s]",
@@ -242,7 +244,7 @@ def _grid(done: Validation, axes: Any) -> None:
         )
 
 
-def _draw(done: Validation, bands: Bands | None) -> tuple[Any, Any]:
+def _draw(done: FlownCase, bands: Bands | None) -> tuple[Any, Any]:
     """The figure, and the axis that has every label."""
     kind = done.case.maneuver or ""
     if done.grid:
@@ -279,7 +281,7 @@ def _draw(done: Validation, bands: Bands | None) -> tuple[Any, Any]:
     return figure, np.ravel(axes)[0]
 
 
-def _over_time(done: Validation, channel: str, axis: Any) -> None:
+def _over_time(done: FlownCase, channel: str, axis: Any) -> None:
     """One channel over time, with the references that have it over time."""
     unit = _UNITS[channel]
     if done.reference.abscissa == "t":
@@ -295,7 +297,7 @@ def _over_time(done: Validation, channel: str, axis: Any) -> None:
         axis.invert_yaxis()
 
 
-def case_figure(done: Validation, path: Path, bands: Bands | None = None) -> Path:
+def case_figure(done: FlownCase, path: Path, bands: Bands | None = None) -> Path:
     """Draw a case: channels over the references; the track of a turn, the curve of a spiral.
 
     Parameters

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ident.output import html_table
+from ident.validation.flown_case import FlownCase
 from sim.boat.database import version_words
 
 if TYPE_CHECKING:
@@ -144,6 +145,21 @@ class Validation:
     def database(self) -> dict[str, Any]:
         """Path, version and digest, as every JSON output names them."""
         return {"path": self.db, "version": self.version, "digest": self.digest}
+
+    @property
+    def flown(self) -> FlownCase:
+        """The case as its figures show it."""
+        return FlownCase(
+            case=self.case,
+            simulation=replace(self.simulation, trim=None),
+            reference=self.reference,
+            as_started={source: replace(flight, trim=None) for source, flight in self.as_started.items()},
+            curve=self.curve,
+            grid=self.grid,
+            in_waves=self.in_waves,
+            bands=self.bands,
+            database=self.database,
+        )
 
     @property
     def table(self) -> pd.DataFrame:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ident.drawing import margins
 from ident.text import in_file_name
 from ident.validation.figures import DOWNWARDS, blank, dress, finish, readable
-from ident.validation.result import Validation
+from ident.validation.flown_case import FlownCase
 from sim.boat.database import version_words
 from sim.flight.simulation import Simulation
 from sim.waves.linear import mean_direction
@@ -49,7 +49,7 @@ def over_heading(flight: Simulation, channel: str, sectors: int = _SECTORS) -> t
     return middle, mean, np.sqrt(np.maximum(square - mean**2, 0.0))
 
 
-def turn_figures(done: Validation, folder: Path, kind: str = "png") -> list[Path]:
+def turn_figures(done: FlownCase, folder: Path, kind: str = "png") -> list[Path]:
     """Pitch, depth, heel and speed of a turn in waves over heading, as Figs. 43 to 45 of Kim (2021).
 
     Parameters

@@ -5,17 +5,14 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
-from ident.metrics import seaway
-from ident.metrics.in_waves import BROACHING
 from ident.text import in_file_name
 from ident.validation.figures import case_figure
-from ident.validation.result import Validation
+from ident.validation.flown_case import FlownCase
 from ident.validation.turn_figures import turn_figures
-from ident.validation.wave_figures import exceedance_figure, harmonics_figure, seaway_figure, spectrum_figure
 from sim.boat.database import version_words
 
 
-def figures_of(done: Validation, folder: Path, kind: str = "png") -> list[Path]:
+def figures_of(done: FlownCase, folder: Path, kind: str = "png") -> list[Path]:
     """Every figure of a flown case: its own, and further ones in an irregular sea.
 
     Parameters
@@ -28,7 +25,7 @@ def figures_of(done: Validation, folder: Path, kind: str = "png") -> list[Path]:
     return [case_figure(done, path, done.bands), *sea_figures(done, folder, kind), *turn_figures(done, folder, kind)]
 
 
-def sea_figures(done: Validation, folder: Path, kind: str = "png") -> list[Path]:
+def sea_figures(done: FlownCase, folder: Path, kind: str = "png") -> list[Path]:
     """Figures of a flown case in an irregular sea: histories, spectra, exceedance of broaching.
 
     Parameters
@@ -39,6 +36,10 @@ def sea_figures(done: Validation, folder: Path, kind: str = "png") -> list[Path]
     """
     if done.case.maneuver != "irregular_waves" or done.simulation.waves is None:
         return []
+    from ident.metrics import seaway
+    from ident.metrics.in_waves import BROACHING
+    from ident.validation.wave_figures import exceedance_figure, seaway_figure, spectrum_figure
+
     database = done.database
     stamp = version_words(database)
     title, name = f"{done.case.title}, {done.case.vehicle}", f"{in_file_name(done.case.name)}_v{database['version']}"
@@ -51,7 +52,7 @@ def sea_figures(done: Validation, folder: Path, kind: str = "png") -> list[Path]
     ]
 
 
-def harmonics_over_depth(done: list[Validation], folder: Path, kind: str = "png") -> list[Path]:
+def harmonics_over_depth(done: list[FlownCase], folder: Path, kind: str = "png") -> list[Path]:
     """First harmonics over depth of the cases in a regular wave that were flown, beside the published ones.
 
     Parameters
@@ -64,7 +65,7 @@ def harmonics_over_depth(done: list[Validation], folder: Path, kind: str = "png"
     -------
     A figure for each vehicle and wave; none when no case is in regular waves.
     """
-    groups: dict[str, list[Validation]] = {}
+    groups: dict[str, list[FlownCase]] = {}
     for one in done:
         if one.in_waves.harmonics and one.case.waves is not None:
             depth = one.case.initial.depth_m
@@ -75,9 +76,11 @@ def harmonics_over_depth(done: list[Validation], folder: Path, kind: str = "png"
     return [_over_depth(group, folder, f"_{i + 1}" if i else "", kind) for i, group in enumerate(groups.values())]
 
 
-def _over_depth(done: list[Validation], folder: Path, suffix: str, kind: str) -> Path:
+def _over_depth(done: list[FlownCase], folder: Path, suffix: str, kind: str) -> Path:
     """The figure of one vehicle in one wave."""
     import pandas as pd
+
+    from ident.validation.wave_figures import harmonics_figure
 
     metric = {"dz1_over_aw": "dz1_over_aw", "theta1_deg": "theta1"}
     rows = [
