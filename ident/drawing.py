@@ -255,10 +255,11 @@ class _Shared(Generic[T]):
                 del self.given[job]
 
 
-def beside(draw: Callable[..., T], jobs: Sequence[tuple[Any, ...]], workers: int = 1) -> list[T]:
-    """``draw(*job)`` for every job, in several processes.
+@contextlib.contextmanager
+def begun(draw: Callable[..., T], jobs: Sequence[tuple[Any, ...]], workers: int = 1) -> Iterator[Callable[[], list[T]]]:
+    """``draw(*job)`` for every job, begun by other processes while this one does something else.
 
-    This process draws from the front, the others from the back. What is drawn does not depend on who draws it.
+    They draw from the back; this one from the front, once it asks. What is drawn does not depend on who draws it.
 
     Parameters
     ----------
@@ -266,21 +267,32 @@ def beside(draw: Callable[..., T], jobs: Sequence[tuple[Any, ...]], workers: int
     jobs : Its arguments, which can be sent to another process.
     workers : Processes, this one among them; 0 for all cores. No other is started for few jobs.
 
-    Returns
-    -------
-    The results, in the order of the jobs.
+    Yields
+    ------
+    A function without arguments: draws what is left and gives the results, in the order of the jobs.
     """
     others = min(workers or cores(), len(jobs) // 2) - 1
     if others < 1 or len(jobs) < _WORTH:
-        return [draw(*job) for job in jobs]
+        yield lambda: [draw(*job) for job in jobs]
+        return
     shared = _Shared(draw, jobs)
     pool = ProcessPoolExecutor(others, multiprocessing.get_context("spawn"), _ready, (inputs.noted(),))
+
+    def finish() -> list[T]:
+        shared.here()
+        return [shared.drawn[k] for k in range(len(jobs))]
+
     try:
         with _unheard():
             for _ in range(others):
                 shared.give(pool)
-        shared.here()
+        yield finish
     finally:
         shared.left.clear()
         pool.shutdown(wait=False, cancel_futures=True)
-    return [shared.drawn[k] for k in range(len(jobs))]
+
+
+def beside(draw: Callable[..., T], jobs: Sequence[tuple[Any, ...]], workers: int = 1) -> list[T]:
+    """``draw(*job)`` for every job, in several processes, in the order of the jobs; parameters as of ``begun``."""
+    with begun(draw, jobs, workers) as finish:
+        return finish()

@@ -8,14 +8,15 @@ them. Colour is the quality word, in all figures the same; hollow points are mir
 from __future__ import annotations
 
 import base64
+import contextlib
 import io
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
-from ident.drawing import beside, fixed_labels, margins, scientific
+from ident.drawing import begun, fixed_labels, margins, scientific
 from ident.text import in_figure
 from sim.boat import catalogue
 from sim.boat.catalogue import Term
@@ -319,10 +320,11 @@ def _draw(panels: list[Panel], title: str, stamp: str, colours: dict[str, str]) 
     return "data:image/svg+xml;base64," + base64.b64encode(stream.getvalue()).decode()
 
 
-def draw_figures(
+@contextlib.contextmanager
+def figures_begun(
     vehicle: Vehicle, rows: pd.DataFrame, colours: dict[str, str], version: int, workers: int = 1
-) -> list[Picture]:
-    """Every coefficient of one vehicle, drawn.
+) -> Iterator[Callable[[], list[Picture]]]:
+    """Every coefficient of one vehicle, drawn by other processes while this one does something else.
 
     Parameters
     ----------
@@ -332,9 +334,9 @@ def draw_figures(
     version : Database version, printed on each figure with vehicle and frame.
     workers : Processes that draw; 0 for all cores. The pictures do not depend on it.
 
-    Returns
-    -------
-    One picture a group, part and abscissa.
+    Yields
+    ------
+    A function that gives one picture a group, part and abscissa.
     """
     order = {name: i for i, name in enumerate(vehicle.part_names())}
     rows = rows.sort_values("part", key=lambda part: part.map(order), kind="stable")
@@ -348,5 +350,13 @@ def draw_figures(
         caption = ", ".join(dict.fromkeys(name for panel in panels for name in panel.rows["coefficient"]))
         named.append((anchor, title, caption))
         jobs.append((panels, title, stamp, colours))
-    images = beside(_draw, jobs, workers)
-    return [Picture(*words, image) for words, image in zip(named, images, strict=True)]
+    with begun(_draw, jobs, workers) as images:
+        yield lambda: [Picture(*words, image) for words, image in zip(named, images(), strict=True)]
+
+
+def draw_figures(
+    vehicle: Vehicle, rows: pd.DataFrame, colours: dict[str, str], version: int, workers: int = 1
+) -> list[Picture]:
+    """Every coefficient of one vehicle, drawn; parameters as of ``figures_begun``."""
+    with figures_begun(vehicle, rows, colours, version, workers) as pictures:
+        return pictures()

@@ -17,7 +17,7 @@ from ident.checks.findings import SEVERITIES, spans
 from ident.database.provenance import steps
 from ident.fitting.notes import group_unused, group_warnings, stored_unused, stored_warnings
 from ident.output import whole
-from ident.report.figures import draw_figures, equations, quality_colours
+from ident.report.figures import Picture, equations, figures_begun, quality_colours
 from ident.report.interactive import Drawn, write_interactive
 from ident.report.score import read_score
 from ident.report.values import Run, runs_of, term_anchor, term_pages
@@ -126,7 +126,8 @@ def _coverage(vehicle: Vehicle, rows: pd.DataFrame, factors: dict[str, float]) -
         }
         if not of_term.empty:
             origin = of_term["origin"].value_counts()
-            words = sorted({q for q in of_term["quality"] if q}, key=lambda q: factors.get(q, 0.0))
+            # In the order of the vocabulary: of words with one factor a set has any order.
+            words = [q for q in factors if q in set(of_term["quality"])]
             row |= {
                 "measured": int(origin.get("measured", 0) + origin.get("published", 0)),
                 "mirror": int(origin.get("mirror", 0)),
@@ -212,23 +213,20 @@ def _errata(vehicle: Vehicle) -> list[dict[str, str]]:
 
 
 def _content(
-    db: str, number: int, vehicle: Vehicle, rows: pd.DataFrame, commit: Version, workers: int
+    db: str,
+    number: int,
+    vehicle: Vehicle,
+    rows: pd.DataFrame,
+    commit: Version,
+    vocabulary: list[dict[str, Any]],
 ) -> dict[str, Any]:
-    """Everything the template shows."""
+    """Everything the template shows but the pictures and what refers to them."""
     from markupsafe import Markup
 
-    vocabulary = _vocabulary(commit, rows)
-    colours = quality_colours(q["word"] for q in vocabulary)
     coverage = _coverage(vehicle, rows, {q["word"]: q["factor"] or 1.0 for q in vocabulary})
     columns = {a: c for c, a in axis_columns().items()}
     combined = (rows[columns["alpha"]].fillna(0.0) != 0.0) & (rows[columns["beta"]].fillna(0.0) != 0.0)
-    pictures = draw_figures(vehicle, rows, colours, number, workers)
-    runs = runs_of(rows, commit)
-    pages = term_pages(vehicle_terms(vehicle), rows, pictures, runs)
     return {
-        "term_pages": pages,
-        "drawn": {p.symbol: [anchor for anchor, _ in p.figures] for p in pages},
-        "runs": list(runs.values()),
         "many_runs": _MANY_RUNS,
         "script": Markup((files("ident") / "report" / "report.js").read_text("utf-8")),
         "vehicle": vehicle,
@@ -243,7 +241,6 @@ def _content(
         "combined": int(combined.sum()),
         "rules": RULES,
         "points": len(rows),
-        "pictures": pictures,
         "signs": _signs(Coefficients(vehicle, rows), rows),
         "warnings": group_warnings(stored_warnings(commit)),
         "unused": group_unused(stored_unused(commit)),
@@ -251,8 +248,19 @@ def _content(
         "severities": _severities(commit.stored("checks", []) if "checks" in commit.metadata else None),
         "calibration": _calibration(commit, vehicle, number),
         "vocabulary": vocabulary,
-        "colours": colours,
+        "colours": quality_colours(q["word"] for q in vocabulary),
         "errata": _errata(vehicle),
+    }
+
+
+def _pictured(vehicle: Vehicle, rows: pd.DataFrame, runs: dict[str, Run], pictures: list[Picture]) -> dict[str, Any]:
+    """Pictures, and the pages of terms that refer to them."""
+    pages = term_pages(vehicle_terms(vehicle), rows, pictures, runs)
+    return {
+        "pictures": pictures,
+        "term_pages": pages,
+        "drawn": {p.symbol: [anchor for anchor, _ in p.figures] for p in pages},
+        "runs": list(runs.values()),
     }
 
 
@@ -324,13 +332,17 @@ def write_report(
     commit = own_version(db, boat.name, number)
     path = Path(out) / f"{re.sub(r'[^A-Za-z0-9._-]', '_', boat.name)}_v{number}.html"
     page_of_figures = path.with_name(f"{path.stem}_interactive.html")
-    if interactive:
-        shown = [Drawn(n, *_drawn(db, n, boat.name)) for n in dict.fromkeys((number, *beside))]
-        write_interactive(boat, shown, page_of_figures, path.name)
-    content = _content(db, number, boat, rows, commit, workers) | {
-        "interactive": page_of_figures.name if interactive else "",
-        "score": read_score(scoreboard, commit.digest, len(rows)) if scoreboard else None,
-    }
+    vocabulary = _vocabulary(commit, rows)
+    colours = quality_colours(q["word"] for q in vocabulary)
+    with figures_begun(boat, rows, colours, number, workers) as pictures:
+        if interactive:
+            shown = [Drawn(n, *_drawn(db, n, boat.name)) for n in dict.fromkeys((number, *beside))]
+            write_interactive(boat, shown, page_of_figures, path.name)
+        content = _content(db, number, boat, rows, commit, vocabulary) | {
+            "interactive": page_of_figures.name if interactive else "",
+            "score": read_score(scoreboard, commit.digest, len(rows)) if scoreboard else None,
+        }
+        content |= _pictured(boat, rows, runs_of(rows, commit), pictures())
     page = _template().render(content)
     with whole(path) as part:
         part.write_text(page, encoding="utf-8")
