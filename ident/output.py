@@ -72,6 +72,26 @@ def check_file(path: Path) -> None:
             raise InputError(str(path), "a file that may not be written to", "a file you may write to")
 
 
+def file_at(path: Path, name: str) -> Path:
+    """Where a file goes: a path with its ending, that is no folder, is the file itself; else it is in that folder.
+
+    Raises
+    ------
+    InputError
+        For a place that cannot be written to.
+
+    Examples
+    --------
+    >>> file_at(Path("exported"), "coefficients_v0.json").name, file_at(Path("bb2.json"), "coefficients_v0.json").name
+    ('coefficients_v0.json', 'bb2.json')
+    """
+    if path.suffix == Path(name).suffix and not path.is_dir():
+        check_file(path)
+        return path
+    check_folder(path)
+    return path / name
+
+
 @contextlib.contextmanager
 def _as_message(path: Path) -> Iterator[None]:
     """What the file system refuses becomes an ``InputError``."""

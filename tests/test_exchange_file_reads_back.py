@@ -16,7 +16,10 @@ from sim.files.errors import InputError
 
 def test_a_version_comes_back_to_its_digest(fitted_db, tmp_path):
     done = export_exchange(fitted_db, None, tmp_path)
-    data = json.loads((tmp_path / "coefficients_v0.json").read_text("utf-8"))
+    text = (tmp_path / "coefficients_v0.json").read_text("utf-8")
+    assert export_exchange(fitted_db, None, tmp_path / "bb2.json")["file"] == str(tmp_path / "bb2.json")
+    assert (tmp_path / "bb2.json").read_text("utf-8") == text
+    data = json.loads(text)
     assert set(data) <= set(schema()["properties"])
     assert set(schema()["required"]) <= set(data)
     assert data["units"]["beta_deg"] == "deg"

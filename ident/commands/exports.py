@@ -29,7 +29,10 @@ _CASE = "hzz20"
 )
 @click.option("--vehicle", default=None, help="With --case: bundled vehicle or vehicle file, instead of the case's.")
 @click.option(
-    "--fmi", type=click.Choice(["2", "3"]), default=None, help="With --format fmu: version of FMI, 2 without."
+    "--fmi",
+    type=click.Choice(["2", "3", "2.0", "3.0"]),
+    default=None,
+    help="With --format fmu: version of FMI, 2 without.",
 )
 @DB
 @VERSION
@@ -46,8 +49,8 @@ def export(
 ) -> None:
     """Write one version for other programs.
 
-    PATH is a folder. csv, parquet: the coefficients as a plain file. json: the version whole, with units, frame,
-    covariance and digest, which `ident import` reads back. c: the boat in a case as one header and
+    PATH is a folder or, for csv, parquet and json, a file with that ending. csv, parquet: the coefficients as a plain
+    file. json: the version whole, with units, frame, covariance and digest, which `ident import` reads back. c: the boat in a case as one header and
     one source of C99, which step as the simulator does. fmu: the same as an FMU for co-simulation, with its sources,
     compiled by the C compiler of this machine; PATH is FILE.fmu. daveml: the tables of the case's vehicle with check
     cases (ANSI/AIAA S-119); PATH is FILE.dml. jsbsim: an aircraft file whose external reactions are the boat's loads;
@@ -70,7 +73,7 @@ def export(
         if kind in _ROWS:
             done = _rows(path, kind, db, version)
         else:
-            done = _flown(path, kind, case or _CASE, vehicle, db, version, int(fmi or "2"))
+            done = _flown(path, kind, case or _CASE, vehicle, db, version, int((fmi or "2")[0]))
     if json_path != "-":
         for name in done.get("files", [done.get("file")]):
             click.echo(visible(name))
@@ -82,9 +85,7 @@ def export(
 
 def _rows(path: Path, kind: str, db: str, version: int | None) -> dict[str, Any]:
     from ident.database import compare
-    from ident.output import check_folder
 
-    check_folder(path)
     if kind == "json":
         from ident.exports.exchange import export_exchange
 

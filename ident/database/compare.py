@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ident.output import check_folder, html_table, whole
+from ident.output import file_at, html_table, whole
 from sim.boat.database import axis_columns, last_own, read_rows, versions
 
 if TYPE_CHECKING:
@@ -127,14 +127,14 @@ def compared(first: pd.DataFrame, second: pd.DataFrame) -> list[Change]:
     return changes
 
 
-def export(db: str, version: int | None, kind: str, folder: Path) -> dict[str, Any]:
+def export(db: str, version: int | None, kind: str, to: Path) -> dict[str, Any]:
     """Write one version as a plain file.
 
     Parameters
     ----------
     db, version : Database and version (latest when None).
     kind : ``parquet``, ``csv`` or ``json``.
-    folder : Where the file goes; created when absent.
+    to : Folder that the file goes to, created when absent, or a file with the ending of its kind.
 
     Returns
     -------
@@ -144,11 +144,10 @@ def export(db: str, version: int | None, kind: str, folder: Path) -> dict[str, A
     Raises
     ------
     InputError
-        For a missing database or version, a folder that is a file or cannot be written to.
+        For a missing database or version, a folder that is a file, or a place that cannot be written to.
     """
     rows, number = read_rows(db, version)
-    check_folder(folder)
-    path = folder / f"coefficients_v{number}.{kind}"
+    path = file_at(to, f"coefficients_v{number}.{kind}")
     with whole(path) as part:
         if kind == "parquet":
             rows.to_parquet(part, index=False)

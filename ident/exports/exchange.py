@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from ident.database.store import commit
-from ident.output import check_folder, whole
+from ident.output import file_at, whole
 from sim.boat.database import Version, axis_columns, column_order, column_type, digest, last_own, read_rows, versions
 from sim.files.errors import InputError
 from sim.files.frames import PROGRAM
@@ -57,8 +57,8 @@ def schema() -> dict[str, Any]:
     }
 
 
-def export_exchange(db: str, version: int | None, folder: Path) -> dict[str, Any]:
-    """Write a version as ``coefficients_v<version>.json``.
+def export_exchange(db: str, version: int | None, to: Path) -> dict[str, Any]:
+    """Write a version as ``coefficients_v<version>.json`` into a folder, or as a file that ends in ``.json``.
 
     Returns
     -------
@@ -67,11 +67,10 @@ def export_exchange(db: str, version: int | None, folder: Path) -> dict[str, Any
     Raises
     ------
     InputError
-        For a missing database or version, or a folder that cannot be written to.
+        For a missing database or version, or a place that cannot be written to.
     """
     rows, number = read_rows(db, version)
-    check_folder(folder)
-    path, history = folder / f"coefficients_v{number}.json", versions(db)
+    path, history = file_at(to, f"coefficients_v{number}.json"), versions(db)
     vehicles = [
         _vehicle(str(name), of_vehicle, history, number) for name, of_vehicle in rows.groupby("vehicle", sort=False)
     ]

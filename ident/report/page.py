@@ -47,10 +47,15 @@ def _time(stamp: str) -> str:
 
 
 def _option(key: str, value: Any) -> str:
-    """An option of the fit in words."""
+    """An option of the fit in words; what is stated of nothing is left out."""
     if isinstance(value, dict):
-        return f"{key}: " + ", ".join(f"{k} {v}" for k, v in value.items())
-    return f"{key} {value}"
+        stated = {k: v for k, v in value.items() if v not in ([], None, "")}
+        return f"{key}: " + ", ".join(f"{k} {_listed(v)}" for k, v in stated.items())
+    return f"{key} {_listed(value)}"
+
+
+def _listed(value: Any) -> str:
+    return " and ".join(map(str, value)) if isinstance(value, list) else str(value)
 
 
 def _provenance(db: str, number: int, commit: Version, vehicle: Vehicle) -> list[tuple[str, str]]:

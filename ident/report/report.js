@@ -60,9 +60,11 @@ box?.addEventListener("input", () => {
       const name = term.querySelector("summary .sym").textContent.toLowerCase();
       let here = 0;
       for (const row of [...term.querySelectorAll("tr")].slice(1)) {
-        const text = (name + " " + row.textContent).toLowerCase().replace(/\u2212/g, "-");
+        const cells = [name, ...[...row.cells].map((cell) => cell.textContent)];
+        const text = cells.join(" ").toLowerCase().replace(/\u2212/g, "-"), single = text.split(/[\s(),]+/);
+        const holds = (w) => (isNaN(w) ? text.includes(w) : single.some((s) => s !== "" && +s === +w));
         const behind = (row.dataset.cases || "").split(" ");
-        row.hidden = !words.every((w) => w.startsWith("case:") || text.includes(w)) || !flown.every((k) => behind.includes(k));
+        row.hidden = !words.every((w) => w.startsWith("case:") || holds(w)) || !flown.every((k) => behind.includes(k));
         here += !row.hidden;
       }
       term.hidden = words.length > 0 && !here;
