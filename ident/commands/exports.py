@@ -50,12 +50,13 @@ def export(
     """Write one version for other programs.
 
     PATH is a folder or, for csv, parquet and json, a file with that ending. csv, parquet: the coefficients as a plain
-    file. json: the version whole, with units, frame, covariance and digest, which `ident import` reads back. c: the boat in a case as one header and
-    one source of C99, which step as the simulator does. fmu: the same as an FMU for co-simulation, with its sources,
-    compiled by the C compiler of this machine; PATH is FILE.fmu. daveml: the tables of the case's vehicle with check
-    cases (ANSI/AIAA S-119); PATH is FILE.dml. jsbsim: an aircraft file whose external reactions are the boat's loads;
-    PATH is NAME/NAME.xml. gazebo: an SDF model with the terms of Gazebo's hydrodynamics plugin, fitted where they are
-    tables here; PATH is FILE.sdf. What a format cannot hold is printed, and stands in its file.
+    file. json: the version whole, with units, frame, covariance and digest, which `ident import` reads back. c: the
+    boat in a case as one header and one source of C99, which step as the simulator does. fmu: the same as an FMU for
+    co-simulation, with its sources, compiled by the C compiler of this machine; PATH is FILE.fmu. daveml: the tables
+    of the case's vehicle with check cases (ANSI/AIAA S-119); PATH is FILE.dml. jsbsim: an aircraft file whose external
+    reactions are the boat's loads; PATH is NAME/NAME.xml. gazebo: an SDF model with the terms of Gazebo's hydrodynamics
+    plugin, fitted where they are tables here; PATH is FILE.sdf. What a format cannot hold is printed, and stands in its
+    file.
 
     \b
     Example: ident export --version 0 --format csv exported/
