@@ -6,6 +6,7 @@ a result that is no number is no success.
 
 from __future__ import annotations
 
+import re
 from importlib.resources import files
 
 import pytest
@@ -58,7 +59,9 @@ def test_every_bundled_vehicle_can_be(name):
         ("[3.433, 17.6, 17.522]", "[3.433, 1760.0, 1752.2]", "radius_of_gyration"),
         ("mass = { value = 4.440e6", "mass = { value = 4.440e5", "displaced_mass"),
         ("diameter = { value = 5.0", "diameter = { value = 500.0", "propeller.diameter"),
+        ("diameter = { value = 5.0", "diameter = { value = 0.5", "propeller.diameter"),
         ("centre_of_gravity = { value = [0.0", "centre_of_gravity = { value = [100.0", "centre_of_gravity"),
+        ("position = [31.1794, 3.9057, -3.9057]", "position = [62.3588, 3.9057, -3.9057]", "stern_plane_1, position"),
         ("position = [31.1794, 3.9057, -3.9057]", "position = [311.794, 3.9057, -3.9057]", "stern_plane_1, position"),
         ("position = [31.1794, 3.9057, -3.9057]", "position = [31.1794, 3.9057, 3.9057]", "stern_plane_1, mirror"),
         ('mirror = "stern_plane_4"', 'mirror = "stern_plane_2"', "stern_plane_1, mirror"),
@@ -386,3 +389,19 @@ def test_scales_and_noise_that_no_trial_has_are_refused(tmp_path, key):
 def test_a_zigzag_without_an_angle_is_none(words):
     with pytest.raises(InputError, match="above 0"):
         stated(words)
+
+
+@pytest.mark.parametrize("words", ["zigzag 10/1e+10", "zigzag 1e1/10", "turn 3e-1", "turn 3.5.1", "turning_circle 350"])
+def test_an_angle_is_not_a_part_of_a_number(words):
+    with pytest.raises(InputError, match="maneuver"):
+        stated(words)
+    assert str(stated("zigzag 20/20 at 10 kts")) == "zigzag 20/20"
+
+
+def test_a_gain_that_no_planes_follow_is_refused(tmp_path):
+    text = (files("sim") / "cases" / "depth-change.toml").read_text("utf-8")
+    path = tmp_path / "case.toml"
+    for key in ("P_z", "D_z", "I_theta"):
+        path.write_text(re.sub(rf"(?m)^{key} = .*", f"{key} = 3e6", text, count=1), "utf-8")
+        with pytest.raises(InputError, match=key):
+            load_case(path)

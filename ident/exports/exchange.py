@@ -6,6 +6,7 @@ stand in the rows), and what the commit says of itself. The files of a run table
 
 from __future__ import annotations
 
+import hashlib
 import json
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,7 +18,9 @@ from sim.boat.database import Version, axis_columns, column_order, column_type, 
 from sim.files.errors import InputError
 from sim.files.frames import PROGRAM
 
-FORMAT, SCHEMA = "ident exchange", 1
+FORMAT, SCHEMA = "ident exchange", 2
+# Files without a seal: read as far as the digests of their rows go.
+_UNSEALED = 1
 # What a commit says anew, and what belongs to the database that it stood in.
 _OF_THE_COMMIT = frozenset({"digest", "program", "vehicle", "time", "beside", "after", "seal", "parent"})
 _KINDS = {"double": "number", "int64": "integer", "string": "string"}
@@ -43,7 +46,7 @@ def schema() -> dict[str, Any]:
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": FORMAT,
         "type": "object",
-        "required": ["format", "schema", "frame", "units", "vehicles"],
+        "required": ["format", "schema", "frame", "units", "vehicles", "seal"],
         "additionalProperties": False,
         "properties": {
             "format": {"const": FORMAT},
@@ -53,6 +56,7 @@ def schema() -> dict[str, Any]:
             "units": {"type": "object", "additionalProperties": text},
             "covariance": text,
             "vehicles": {"type": "array", "minItems": 1, "items": vehicle},
+            "seal": {"type": "string", "pattern": "^[0-9a-f]{64}$"},
         },
     }
 
@@ -83,6 +87,7 @@ def export_exchange(db: str, version: int | None, to: Path) -> dict[str, Any]:
         "covariance": "rows of one estimate share their values; correlation: pairs of estimate and coefficient",
         "vehicles": vehicles,
     }
+    data["seal"] = _seal(data)
     with whole(path) as part:
         part.write_text(json.dumps(data, indent=1, allow_nan=False, ensure_ascii=False) + "\n", encoding="utf-8")
     commit_of = next(v for v in history if v.number == number)
@@ -93,6 +98,12 @@ def export_exchange(db: str, version: int | None, to: Path) -> dict[str, Any]:
         "rows": len(rows),
         "vehicles": [{k: v[k] for k in ("vehicle", "version", "digest")} | {"rows": len(v["rows"])} for v in vehicles],
     }
+
+
+def _seal(data: dict[str, Any]) -> str:
+    """SHA-256 of all that a file says but its seal, however its keys and blanks are ordered."""
+    text = json.dumps({k: v for k, v in data.items() if k != "seal"}, sort_keys=True, separators=(",", ":"))
+    return hashlib.sha256(text.encode()).hexdigest()
 
 
 def _program() -> str:
@@ -156,10 +167,13 @@ def import_exchange(path: Path, db: str, wait: float) -> list[Imported]:
     Raises
     ------
     InputError
-        For a file that cannot be read, is no exchange file, or whose rows have another digest than it says; nothing
-        is committed then.
+        For a file that cannot be read, is no exchange file, or is not what was exported: its rows have another
+        digest than it says, or it another seal. Nothing is committed then.
     """
-    read = [_rows_of(path, one) for one in _read(path)]
+    data = _read(path)
+    read = [_rows_of(path, one) for one in data["vehicles"]]
+    if data["schema"] != _UNSEALED and data.get("seal") != _seal(data):
+        raise InputError(str(path), "not what its seal says", "a file that was not changed: export it once more")
     done = []
     for (name, wanted, metadata), rows in read:
         number, new = commit(db, rows, metadata, wait)
@@ -167,17 +181,17 @@ def import_exchange(path: Path, db: str, wait: float) -> list[Imported]:
     return done
 
 
-def _read(path: Path) -> list[Any]:
+def _read(path: Path) -> dict[str, Any]:
     try:
         data = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError, ValueError) as error:
         raise InputError(str(path), f"cannot be read: {error}", "a file of `ident export --format json`") from error
-    if not isinstance(data, dict) or data.get("format") != FORMAT or data.get("schema") != SCHEMA:
+    if not isinstance(data, dict) or data.get("format") != FORMAT or data.get("schema") not in (SCHEMA, _UNSEALED):
         raise InputError(str(path), "no exchange file of this program", f"format {FORMAT!r}, schema {SCHEMA}")
     vehicles = data.get("vehicles")
     if not isinstance(vehicles, list) or not vehicles:
         raise InputError(f"{path}, vehicles", "none", "one vehicle or more")
-    return vehicles
+    return data
 
 
 def _rows_of(path: Path, one: Any) -> tuple[tuple[str, str, dict[str, str]], Any]:

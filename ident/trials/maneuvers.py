@@ -30,6 +30,8 @@ KINDS = (
     "course_keeping",
 )
 _ALLOWED = "zigzag 20/20, vertical_zigzag 10/10, turning_circle 35, " + ", ".join(KINDS[3:])
+# A number that stands alone; of 1e+10 the 1 is none.
+_ANGLE = r"(?<![\d.])(?<!\de)(?<!\de[ +])(\d+(?:\.\d+)?)(?![.\d]|e[ +]?\d)"
 # Check angles in use, and how far after the reversal its effect is seen in the heading.
 _CHECKS = (1.0, 2.0, 3.0, 5.0, 7.0, 10.0, 15.0, 20.0, 25.0, 30.0, 35.0)
 # A reversal is seen before its angle by this at most [deg], and later by this share of the rudder's way over.
@@ -77,11 +79,13 @@ def stated(text: str) -> Maneuver:
     Raises
     ------
     InputError
-        For words that name none, or a zigzag without its angles.
+        For words that name none, numbers that are not plain, or a zigzag without those.
     """
     low = re.sub(r"[\s_-]+", " ", text.strip().lower()).replace("zig zag", "zigzag")
-    angles = re.search(r"(\d+(?:\.\d+)?)\s*/\s*(\d+(?:\.\d+)?)", low)
-    single = re.search(r"(\d+(?:\.\d+)?)", low)
+    angles = re.search(rf"{_ANGLE}\s*/\s*{_ANGLE}", low)
+    single = re.search(_ANGLE, low)
+    if not single and re.search(r"\d", low):
+        raise InputError("maneuver", repr(text), f"plain numbers of degrees: {_ALLOWED}")
     if "zigzag" in low or re.search(r"\b(zz|hzz|vzz)\b", low):
         if not angles:
             raise InputError("maneuver", repr(text), "a zigzag with rudder and check angle: zigzag 20/20")
@@ -97,7 +101,10 @@ def stated(text: str) -> Maneuver:
     kind = next((k for word, k in words.items() if word in low), "")
     if not kind:
         raise InputError("maneuver", repr(text), _ALLOWED)
-    return Maneuver(kind, float(single[1]) if single and kind in ("turning_circle", "rise") else None)
+    planes = float(single[1]) if single and kind in ("turning_circle", "rise") else None
+    if planes is not None and planes > 90.0:
+        raise InputError("maneuver", repr(text), "an angle of rudder or planes of 90 deg at most")
+    return Maneuver(kind, planes)
 
 
 @dataclass(frozen=True)

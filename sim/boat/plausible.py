@@ -34,6 +34,10 @@ _FASTEST_PLANE = 1000.0
 _LEAST_LIMIT = 1.0
 # What may stand above the sail top, over the length: planes of a boat whose sail top is stated on the axis.
 _ABOVE = 0.05
+# What is on a boat is not farther from its centre of buoyancy, over the length: a cone's tip from its centroid.
+_FARTHEST = 0.75
+# Diameter of a propeller over the length: a large tanker has 0.03, a torpedo 0.1.
+_PROPELLER = (0.01, 0.5)
 _MOTIONS = ("surge", "sway", "heave", "roll", "pitch", "yaw")
 # Floating boats displace what they weigh; a submerged one differs by what its planes can carry.
 _OUT_OF_TRIM = 0.5
@@ -55,7 +59,8 @@ def check_vehicle(vehicle: Any, where: str) -> None:
     A body's mass is spread over its length: its radii of gyration about the centre of gravity are above
     zero, below its length, and the square of none exceeds the sum of the others' (the principal moments
     of inertia of any body: Goldstein, *Classical mechanics*, section 5.3). Whatever is on the boat is no
-    farther from its centre of buoyancy than the boat is long, which is as full as a sphere at most. A boat that
+    farther from its centre of buoyancy than a cone's tip from its centroid, and the boat is as full as a sphere
+    at most; its propeller has a hundredth to half of the length. A boat that
     may heel or trim has its centre of gravity below that of buoyancy, or it lies on its side. A plane has a
     span across its chord, and is the mirror image of the plane that it mirrors, whose share of each command
     is its own seen in the mirror; all planes together lift the bow for dV > 0 and turn to starboard for dH > 0.
@@ -167,8 +172,10 @@ def _mass(vehicle: Any) -> Iterator[tuple[str, str, str]]:
     if light < _FULLNESS[0] or dense > _FULLNESS[1]:
         found = f"{given.displaced_mass.value:g} kg of water displaced over {length:g} m: {light:.3g} of length^3"
         yield "particulars.length", found, f"{_FULLNESS[0]:g} to {_FULLNESS[1]:.2g}, from a needle to a sphere"
-    if vehicle.propeller and not vehicle.diameter < length:
-        yield "propeller.diameter", f"{vehicle.diameter:g} m", f"less than the length of {length:g} m"
+    least, most = (share * length for share in _PROPELLER)
+    if vehicle.propeller and not least <= vehicle.diameter <= most:
+        text = f"{least:.3g} to {most:.3g} m: a hundredth to half of the length of {length:g} m"
+        yield "propeller.diameter", f"{vehicle.diameter:g} m", text
 
 
 def _amidships(vehicle: Any) -> Iterator[tuple[str, str, str]]:
@@ -226,8 +233,9 @@ def _places(vehicle: Any) -> Iterator[tuple[str, str, str]]:
     length, middle = given.length.value, np.array(given.centre_of_buoyancy.value)
     for key, place in places.items():
         away = float(np.linalg.norm(np.array(place) - middle))
-        if away > length:
-            yield key, f"{away:.4g} m from the centre of buoyancy", f"a place on the boat, which is {length:g} m long"
+        if away > _FARTHEST * length:
+            text = f"{_FARTHEST * length:.4g} m at most: a place on the boat, which is {length:g} m long"
+            yield key, f"{away:.4g} m from the centre of buoyancy", text
     if given.sail_top:
         yield from _below_the_sail(places, np.array(given.sail_top.value), length, vehicle.frame.frame.sign("z"))
 

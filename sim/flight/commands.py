@@ -22,6 +22,8 @@ _LAWS = {"fixed": orders.FIXED, "pid": orders.PID, "zigzag": orders.ZIGZAG, "pro
 Angle = Annotated[float, Field(ge=-90.0, le=90.0)]
 # Gains steer back where they are positive; negative ones would drive away.
 Gain = Annotated[float, Field(ge=0.0)]
+# Of planes: with more, three hundredths of a degree or a metre off take them to their limit.
+PlaneGain = Annotated[float, Field(ge=0.0, le=1000.0)]
 
 
 class Event(Data):
@@ -156,21 +158,21 @@ class PlaneCommand(Data):
     check_deg: Annotated[float, Field(ge=0.0, lt=180.0)] = 0.0
     limit_deg: Annotated[float, Field(gt=0.0, le=90.0)] = 30.0
     depth_from: Literal["calm_surface", "pressure"] = "calm_surface"
-    P_z: Gain = 0.0
-    I_z: Gain = 0.0
-    D_z: Gain = 0.0
-    P_theta: Gain = 0.0
-    I_theta: Gain = 0.0
-    D_theta: Gain = 0.0
-    P_y: Gain = 0.0
-    I_y: Gain = 0.0
-    D_y: Gain = 0.0
-    P_psi: Gain = 0.0
-    I_psi: Gain = 0.0
-    D_psi: Gain = 0.0
-    P_r: Gain = 0.0
-    I_r: Gain = 0.0
-    D_r: Gain = 0.0
+    P_z: PlaneGain = 0.0
+    I_z: PlaneGain = 0.0
+    D_z: PlaneGain = 0.0
+    P_theta: PlaneGain = 0.0
+    I_theta: PlaneGain = 0.0
+    D_theta: PlaneGain = 0.0
+    P_y: PlaneGain = 0.0
+    I_y: PlaneGain = 0.0
+    D_y: PlaneGain = 0.0
+    P_psi: PlaneGain = 0.0
+    I_psi: PlaneGain = 0.0
+    D_psi: PlaneGain = 0.0
+    P_r: PlaneGain = 0.0
+    I_r: PlaneGain = 0.0
+    D_r: PlaneGain = 0.0
     step: list[PlaneStep] = Field(default_factory=list)
 
     @model_validator(mode="after")
