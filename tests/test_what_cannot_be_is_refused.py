@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 from importlib.resources import files
 
+import click
 import pytest
 from click.testing import CliRunner
 
@@ -405,3 +406,27 @@ def test_a_gain_that_no_planes_follow_is_refused(tmp_path):
         path.write_text(re.sub(rf"(?m)^{key} = .*", f"{key} = 3e6", text, count=1), "utf-8")
         with pytest.raises(InputError, match=key):
             load_case(path)
+
+
+def test_no_option_takes_what_is_no_number():
+    """Every option of numbers, of every command: click takes nan for one, since it is not below any least."""
+    options = [p for c in main.commands.values() for p in c.params if isinstance(p.type, click.types.FloatParamType)]
+    assert len(options) > 15
+    for option in options:
+        for word in ("nan", "inf", "-inf", "1e999"):
+            with pytest.raises(click.BadParameter, match=r"finite|range"):
+                option.type.convert(word, option, None)
+    assert CliRunner().invoke(main, ["fit", ".", "--wait", "nan"]).exit_code == 2
+
+
+@pytest.mark.parametrize("words", [["--scale", "1e308"], ["--scale", "1e-9"], ["--length", "1e30"]])
+def test_what_a_trial_file_may_not_say_the_command_line_may_not(words):
+    record = str(files("ident") / "starter" / "files" / "zigzag_trial.csv")
+    done = CliRunner().invoke(main, ["trial", record, "--maneuver", "zigzag 20/20", *words])
+    assert (done.exit_code, words[0] in done.output) == (2, True), done.output
+
+
+def test_a_message_may_be_longer_than_a_name(tmp_path):
+    done = CliRunner().invoke(main, ["fit", str(tmp_path), "-m", "x" * 5000])
+    assert done.exit_code == 2
+    assert "campaign.toml" in done.output

@@ -9,7 +9,7 @@ from typing import Any
 
 import click
 
-from ident.commands.shared import DB, VERSION, console_for, emit, equilibrium_of, json_to, out_file
+from ident.commands.shared import DB, VERSION, AnyNumber, Number, console_for, emit, equilibrium_of, json_to, out_file
 from ident.text import in_file_name, on_screen
 
 
@@ -20,9 +20,9 @@ from ident.text import in_file_name, on_screen
 @click.option("--vehicle", default=None, help="Bundled vehicle or path to a vehicle file, instead of the case's.")
 @out_file("File to write, .gif or .mp4; CASE.gif.")
 @click.option("--frames", type=click.IntRange(2, 2000), default=200, show_default=True, help="Number of pictures.")
-@click.option("--fps", type=click.FloatRange(1, 50), default=20.0, show_default=True, help="Pictures a second.")
-@click.option("--start", type=float, default=None, help="Time to begin at [s].")
-@click.option("--end", type=float, default=None, help="Time to end at [s].")
+@click.option("--fps", type=Number(1, 50), default=20.0, show_default=True, help="Pictures a second.")
+@click.option("--start", type=AnyNumber(), default=None, help="Time to begin at [s].")
+@click.option("--end", type=AnyNumber(), default=None, help="Time to end at [s].")
 @json_to("Write what was drawn as JSON.")
 def animate(**options: Any) -> None:
     """Draw a maneuver as an animation: boat, track, depth, pitch, heel and planes.

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ident.commands.shared import DB, MESSAGE, OUT, WAIT, console_for, either, emit, json_to, out_file, told
+from ident.commands.shared import DB, MESSAGE, OUT, WAIT, AnyNumber, console_for, either, emit, json_to, out_file, told
 from ident.text import on_screen
 
 if TYPE_CHECKING:
@@ -130,7 +130,13 @@ def check(folder: Path, json_path: str | None, strict: bool, everything: bool) -
 @click.command()
 @click.argument("folder", type=click.Path(path_type=Path))
 @click.argument("cases_folder", metavar="[OUT]", type=click.Path(path_type=Path), required=False, callback=either)
-@click.option("--target-rel", default=0.1, show_default=True, help="Standard error wanted, relative to a term's size.")
+@click.option(
+    "--target-rel",
+    type=AnyNumber(),
+    default=0.1,
+    show_default=True,
+    help="Standard error wanted, relative to a term's size.",
+)
 @click.option("--facility", type=click.Path(path_type=Path), default=None, help="TOML file of levels and limits.")
 @click.option("--cases", type=click.Choice(["openfoam"]), default=None, help="Write a CFD case for every run into OUT.")
 @click.option("--surface", type=click.Path(path_type=Path), default=None, help="With --cases: STL file of the boat.")

@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from ident.commands.shared import DB, VERSION, console_for, emit, equilibrium_of, json_to, out_file
+from ident.commands.shared import DB, VERSION, Number, console_for, emit, equilibrium_of, json_to, out_file
 from ident.text import on_screen
 
 
@@ -42,7 +42,7 @@ class FlyOptions:
 @DB
 @VERSION
 @out_file("File to write, .csv, .parquet or .nc; CASE_vVERSION.csv by default.")
-@click.option("--every", type=click.FloatRange(min=0, min_open=True), default=None, help="Seconds between records.")
+@click.option("--every", type=Number(min=0, min_open=True), default=None, help="Seconds between records.")
 @click.option(
     "--loads",
     type=click.Choice(["part", "coefficient"]),

@@ -11,7 +11,19 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ident.commands.shared import DB, MESSAGE, OUT, VERSION, WAIT, console_for, emit, equilibrium_of, json_to, out_file
+from ident.commands.shared import (
+    DB,
+    MESSAGE,
+    OUT,
+    VERSION,
+    WAIT,
+    Number,
+    console_for,
+    emit,
+    equilibrium_of,
+    json_to,
+    out_file,
+)
 from ident.text import on_screen, visible
 
 if TYPE_CHECKING:
@@ -134,9 +146,9 @@ class CalibrateOptions:
 )
 @click.option("--dask", default=None, metavar="ADDRESS", help="With --samples: fly them on a Dask cluster.")
 @click.option("--vehicle", default=None, help="With --case: bundled vehicle or vehicle file, not the case's.")
-@click.option("--speed", type=click.FloatRange(min=0, min_open=True), default=None, help="With --case: U [m/s].")
-@click.option("--depth", type=click.FloatRange(min=0), default=None, help="With --case: depth of the sail top [m].")
-@click.option("--angle", type=click.FloatRange(0, 90, min_open=True), default=None, help="With --case: planes [deg].")
+@click.option("--speed", type=Number(min=0, min_open=True), default=None, help="With --case: U [m/s].")
+@click.option("--depth", type=Number(min=0), default=None, help="With --case: depth of the sail top [m].")
+@click.option("--angle", type=Number(0, 90, min_open=True), default=None, help="With --case: planes [deg].")
 @click.option(
     "--reference",
     type=click.Path(path_type=Path),
@@ -349,8 +361,8 @@ def calibrate(**options: Any) -> None:
 @DB
 @VERSION
 @click.option("--case", "case", default="hzz20", show_default=True, help="Case that gives vehicle and environment.")
-@click.option("--speed", "speeds", type=click.FloatRange(0, 100, min_open=True), multiple=True, help="U [m/s]; repeat.")
-@click.option("--depth", "depths", type=click.FloatRange(0, 11000), multiple=True, help="D0 [m]; repeat.")
+@click.option("--speed", "speeds", type=Number(0, 100, min_open=True), multiple=True, help="U [m/s]; repeat.")
+@click.option("--depth", "depths", type=Number(0, 11000), multiple=True, help="D0 [m]; repeat.")
 @out_file("Figure to draw, .png, .svg or .pdf: root loci and Bode plots over speed and depth.")
 @json_to("Write the results as JSON.")
 def stability(

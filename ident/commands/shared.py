@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import json
 import logging
+import math
 import os
 import sys
 import time
@@ -17,10 +18,26 @@ import click
 
 _log = logging.getLogger(__name__)
 
+
+class AnyNumber(click.types.FloatParamType):
+    """A finite number: not ``nan`` or ``inf``, which click takes for one."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """The number; fails as click does."""
+        number = super().convert(value, param, ctx)
+        if not math.isfinite(number):
+            self.fail(f"{value} is not a finite number", param, ctx)
+        return number
+
+
+class Number(AnyNumber, click.FloatRange):
+    """A finite number of a range."""
+
+
 DB = click.option("--db", default="coeff_db", show_default=True, help="Database folder or object-store URL.")
 WAIT = click.option(
     "--wait",
-    type=click.FloatRange(min=0),
+    type=Number(min=0),
     default=60.0,
     show_default=True,
     help="Seconds to wait for another writer of the database.",
@@ -75,7 +92,8 @@ def figure_to(text: str) -> Any:
 def _inputs(command: click.Command, values: dict[str, Any]) -> list[Path]:
     """Files and folders among the arguments that a command reads, its database among them."""
     read = [str(values[p.name]) for p in command.params if p.name and values.get(p.name) and not _is_written(p)]
-    return [Path(os.path.realpath(path)) for text in read if "://" not in text and (path := Path(text)).exists()]
+    # A message may be longer than any name.
+    return [Path(os.path.realpath(text)) for text in read if "://" not in text and os.path.exists(text)]
 
 
 def _is_written(parameter: click.Parameter) -> bool:

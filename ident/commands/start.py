@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from ident.commands.shared import FOLDER, either, emit, json_to
+from ident.commands.shared import FOLDER, AnyNumber, Number, either, emit, json_to
 
 
 @click.command()
@@ -47,12 +47,10 @@ def schema(kind: str, json_path: str | None) -> None:
 @click.command()
 @click.argument("surface", type=click.Path(path_type=Path))
 @click.option("--unit", type=click.Choice(["m", "mm", "cm", "in", "ft"]), required=True, help="Of the surface.")
-@click.option(
-    "--length", type=click.FloatRange(0, 1e4, min_open=True), required=True, help="Over all [m]; checks the unit."
-)
+@click.option("--length", type=Number(0, 1e4, min_open=True), required=True, help="Over all [m]; checks the unit.")
 @click.option("--x", type=click.Choice(["aft", "forward"]), default="aft", show_default=True, help="Where x points.")
 @click.option("--z", type=click.Choice(["up", "down"]), default="up", show_default=True, help="Where z points.")
-@click.option("--axis", type=float, default=0.0, show_default=True, help="z of the hull's axis, in the unit.")
+@click.option("--axis", type=AnyNumber(), default=0.0, show_default=True, help="z of the hull's axis, in the unit.")
 @click.option(
     "--out",
     type=click.Path(path_type=Path),

@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from ident.commands.shared import console_for, either, emit, json_to, out_file
+from ident.commands.shared import Number, console_for, either, emit, json_to, out_file
 from ident.text import on_screen
 
 
@@ -15,10 +15,8 @@ from ident.text import on_screen
 @click.argument("path", metavar="FILE|DIR", type=click.Path(path_type=Path))
 @click.option("--spec", type=click.Path(path_type=Path), default=None, help="trial.toml: what the record does not say.")
 @click.option("--maneuver", default="", help='As "zigzag 20/20" or "turning_circle 35", instead of the spec\'s.')
-@click.option("--scale", type=click.FloatRange(min=0, min_open=True), default=None, help="Full scale over model scale.")
-@click.option(
-    "--length", "length", type=click.FloatRange(min=0, min_open=True), default=None, help="L [m], full scale."
-)
+@click.option("--scale", type=Number(min=0, min_open=True), default=None, help="Full scale over model scale.")
+@click.option("--length", "length", type=Number(min=0, min_open=True), default=None, help="L [m], full scale.")
 @click.option(
     "--figures",
     type=click.Path(path_type=Path),
@@ -49,10 +47,13 @@ def trial(
     """
     from ident.output import check_folder
     from ident.trials.report import measure_all, show, write_csv
-    from ident.trials.spec import load_spec
+    from ident.trials.spec import TrialFile, load_spec
+    from sim.files.schema import checked
 
     stated: dict[str, Any] = {"maneuver": maneuver or None, "scale": scale, "length_m": length}
-    statements = load_spec(spec).model_copy(update={k: v for k, v in stated.items() if v is not None})
+    given = {k: v for k, v in stated.items() if v is not None}
+    read = load_spec(spec).model_dump(exclude_unset=True)
+    statements = checked(TrialFile, read | given, f"--{', --'.join(given)}".replace("_m", "") if given else str(spec))
     if figures is not None:
         check_folder(figures)
     console = console_for(quiet=json_path == "-")

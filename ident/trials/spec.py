@@ -141,7 +141,7 @@ class TrialFile(Data):
     wrap_deg: Literal[180, 360] | None = None
     noise: Noise = Field(default_factory=Noise)
     current: Current | None = None
-    length_m: Positive | None = None
+    length_m: Annotated[float, Field(gt=0.0, le=1e4)] | None = None
     density_kgpm3: Positive | None = None
     step_m: Annotated[float, Field(ge=-1e5, le=1e5)] | None = None
     released_s: float | None = None
