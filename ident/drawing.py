@@ -17,6 +17,7 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, TypeVar, cast
 
@@ -84,37 +85,44 @@ def fixed_labels(axes: Axes, left: float, below: float) -> None:
     axes.xaxis.set_label_coords(0.5, 0.0, axes.transAxes + ScaledTranslation(0.0, -below, scale))
 
 
-def margins(
-    figure: Figure,
-    rows: int,
-    columns: int,
-    *,
-    left: float = 0.75,
-    right: float = 0.15,
-    top: float = 0.6,
-    bottom: float = 0.5,
-    between: float = 0.8,
-    gap: float = 0.6,
-) -> None:
-    """Room around and between panels of equal size; an automatic layout draws every figure twice.
+@dataclass(frozen=True)
+class Margins:
+    """Room around and between the panels of a figure [inches].
+
+    Attributes
+    ----------
+    left, right, top, bottom : From the edges of the figure to the panels.
+    between, gap : Between columns and between rows.
+    """
+
+    left: float = 0.75
+    right: float = 0.15
+    top: float = 0.6
+    bottom: float = 0.5
+    between: float = 0.8
+    gap: float = 0.6
+
+
+def place_panels(figure: Figure, rows: int, columns: int, margins: Margins | None = None) -> None:
+    """Panels of equal size at fixed places; an automatic layout draws every figure twice.
 
     Parameters
     ----------
     figure : Of a size.
     rows, columns : Of panels.
-    left, right, top, bottom : From the edges of the figure to the panels [inches].
-    between, gap : Between columns and between rows [inches].
+    margins : Around and between them.
     """
+    around = margins or Margins()
     width, height = figure.get_size_inches()
-    wide = (width - left - right - between * (columns - 1)) / columns
-    tall = (height - top - bottom - gap * (rows - 1)) / rows
+    wide = (width - around.left - around.right - around.between * (columns - 1)) / columns
+    tall = (height - around.top - around.bottom - around.gap * (rows - 1)) / rows
     figure.subplots_adjust(
-        left=left / width,
-        right=1.0 - right / width,
-        top=1.0 - top / height,
-        bottom=bottom / height,
-        wspace=between / wide,
-        hspace=gap / tall,
+        left=around.left / width,
+        right=1.0 - around.right / width,
+        top=1.0 - around.top / height,
+        bottom=around.bottom / height,
+        wspace=around.between / wide,
+        hspace=around.gap / tall,
     )
 
 

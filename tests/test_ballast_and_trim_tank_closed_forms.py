@@ -13,7 +13,7 @@ from sim.flight.case import load_case
 from sim.flight.commands import TankCommand
 from sim.flight.orders import COMMAND, N_COMMANDS, flat, progress
 from sim.flight.simulate import initial_state, mixer_of, model_of, plane_limits, settings_of, simulate
-from sim.flight.trim import NoEquilibrium, self_propulsion
+from sim.flight.trim import Leveling, NoEquilibrium, self_propulsion
 from sim.kernel import plain
 from sim.kernel import rhs as kernel
 from sim.kernel.assemble import assemble, with_tanks
@@ -124,7 +124,7 @@ def test_level_trim_with_ballast_is_an_equilibrium_of_the_controllers(coefficien
 
 
 def _trim(wet, vehicle, level, limits, depth=4.0):
-    return self_propulsion(wet, mixer_of(vehicle), 5.14444, depth, plane_limits(vehicle)[0], level, limits)
+    return self_propulsion(wet, mixer_of(vehicle), 5.14444, depth, plane_limits(vehicle)[0], Leveling(level, limits))
 
 
 def test_tank_at_its_limit_leaves_the_rest_to_pitch_and_planes(wet, campaign):
@@ -151,7 +151,9 @@ def test_level_trim_by_both_tanks_needs_no_planes(wet, campaign):
 
 def test_plane_beyond_its_limit_is_refused(wet, campaign):
     with pytest.raises(NoEquilibrium):
-        self_propulsion(wet, mixer_of(campaign.vehicle), 5.14444, 4.0, np.full(5, 1e-4), "ballast", (2e4, 0.035))
+        self_propulsion(
+            wet, mixer_of(campaign.vehicle), 5.14444, 4.0, np.full(5, 1e-4), Leveling("ballast", (2e4, 0.035))
+        )
 
 
 def test_ballast_keeps_its_limit_and_rate(coefficients):

@@ -8,7 +8,7 @@ from importlib.util import find_spec
 import numpy as np
 import pytest
 
-from ident.validation.bands import batch_of, fly_samples
+from ident.validation.bands import Execution, batch_of, fly_samples
 from ident.validation.cluster import over_dask
 from ident.validation.draws import draw
 from sim.boat.coefficients import Coefficients
@@ -30,7 +30,7 @@ def case():
 
 @pytest.fixture(scope="module")
 def alone(case, campaign, rows):
-    return fly_samples(case, campaign.vehicle, rows, 9, seed=4, workers=1, chunk=1)
+    return fly_samples(case, campaign.vehicle, rows, 9, seed=4, execution=Execution(workers=1, chunk=1))
 
 
 def _same(one, other):
@@ -43,7 +43,9 @@ def _same(one, other):
 @pytest.mark.parametrize(("workers", "chunk"), [(1, 9), (2, 2), (5, 4)])
 def test_bands_do_not_depend_on_workers_or_chunks(case, campaign, rows, alone, workers, chunk):
     done = []
-    found = fly_samples(case, campaign.vehicle, rows, 9, seed=4, workers=workers, chunk=chunk, each=done.append)
+    found = fly_samples(
+        case, campaign.vehicle, rows, 9, seed=4, execution=Execution(workers=workers, chunk=chunk, each=done.append)
+    )
     _same(alone, found)
     assert sum(done) == 9
 
@@ -108,7 +110,9 @@ def cluster():
 def test_two_dask_processes_give_what_threads_give(cluster, case, campaign, rows, alone, chunk):
     done = []
     address = cluster.scheduler_address
-    found = fly_samples(case, campaign.vehicle, rows, 9, seed=4, dask=address, chunk=chunk, each=done.append)
+    found = fly_samples(
+        case, campaign.vehicle, rows, 9, seed=4, execution=Execution(dask=address, chunk=chunk, each=done.append)
+    )
     _same(alone, found)
     assert sum(done) == 9
 
@@ -140,5 +144,5 @@ def test_missing_extra_says_how_to_install_it(case, campaign, rows, monkeypatch)
 
     monkeypatch.setattr(builtins, "__import__", without)
     with pytest.raises(InputError) as refused:
-        fly_samples(case, campaign.vehicle, rows, 2, dask="tcp://127.0.0.1:1")
+        fly_samples(case, campaign.vehicle, rows, 2, execution=Execution(dask="tcp://127.0.0.1:1"))
     assert "ident-submarine[dask]" in refused.value.allowed

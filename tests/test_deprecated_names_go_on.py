@@ -50,6 +50,11 @@ def test_what_followed_by_its_place_goes_on_and_says_to_be_named():
     with pytest.warns(DeprecationWarning) as caught, pytest.raises(ident.InputError, match="nowhere"):  # noqa: PT030
         ident.calibrate("nowhere.toml", "db", None, "", True, 1, lambda text: None, 1.0, 100, 0, 3)
     assert "(..., workers, each, wait, posterior, sensitivity, seed) by place" in str(caught[0].message)
+    # The former value of a seed that nothing asked for is no option that changes nothing.
+    with pytest.warns(DeprecationWarning, match="use diagnostics"), pytest.raises(ident.InputError, match="nowhere"):
+        ident.calibrate("nowhere.toml", "db", seed=0)
+    with pytest.raises(ident.InputError, match=r"diagnostics\.seed"):
+        ident.calibrate("nowhere.toml", "db", diagnostics=ident.Diagnostics(seed=0))
 
 
 def test_what_is_deprecated_says_since_when_and_what_instead():

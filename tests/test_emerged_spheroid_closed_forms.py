@@ -11,7 +11,7 @@ import pytest
 from sim.hull.emergence import cells, lost_buoyancy
 from sim.hull.surface import read_geometry
 from sim.waves.linear import kinematics, regular
-from sim.waves.loads import evaluate, make_sea, passage
+from sim.waves.loads import Gauges, evaluate, make_sea, passage
 from sim.waves.pressure import Quadrature, rotation
 from sim.waves.spectra import Spectrum, realise
 
@@ -138,7 +138,7 @@ def test_elevations_are_those_of_the_waves(boat, components):
     nothing = np.zeros((0, 3))
     volume = Quadrature(boat.points, boat.volumes)
     box = np.stack([boat.low, boat.high])
-    sea = make_sea(waves, volume, nothing, nothing, nothing, stations=boat.stations, box=box)
+    sea = make_sea(waves, volume, nothing, nothing, nothing, gauges=Gauges(boat.stations, box))
     sums, size = passage(sea), len(boat.stations)
     value, slope = np.zeros(sums.value.shape[1]), np.zeros(sums.value.shape[1])
     evaluate(sea, y, 12.0, sums, value, slope)

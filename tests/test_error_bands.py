@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from ident.validation.band_summary import inside, variance_shares
-from ident.validation.bands import Bands, fly_samples
+from ident.validation.bands import Bands, Execution, fly_samples
 from ident.validation.draws import draw
 from sim.boat.coefficients import Coefficients
 from sim.boat.row_codec import correlation_matrix
@@ -41,7 +41,9 @@ def test_a_sample_does_not_depend_on_how_many_are_drawn(rows):
 
 
 def test_bands_do_not_depend_on_the_number_of_workers(short_case, campaign, rows):
-    one, two = (fly_samples(short_case[0], campaign.vehicle, rows, 6, seed=1, workers=n) for n in (1, 2))
+    one, two = (
+        fly_samples(short_case[0], campaign.vehicle, rows, 6, seed=1, execution=Execution(workers=n)) for n in (1, 2)
+    )
     for channel, values in one.channels.items():
         assert np.array_equal(values, two.channels[channel], equal_nan=True), channel
 

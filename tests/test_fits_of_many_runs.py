@@ -17,7 +17,7 @@ from ident.fitting.bench import recorded, repeated_campaign, worse
 from ident.fitting.fit import fit
 from ident.identification import solver
 from ident.identification.identify import identify
-from ident.identification.stage_solve import solve_stage, weights
+from ident.identification.stage_solve import Loads, solve_stage, weights
 from ident.options import Work
 
 BB2 = Path(__file__).resolve().parents[1] / "raw_captive_data" / "bb2"
@@ -66,7 +66,7 @@ def in_full(a, b, value, spread, shared, old, covariance):
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_a_stage_is_the_least_squares_written_out_in_full(seed, full):
     a, b, value, spread, shared, old, covariance = given = stage(seed)
-    found = solve_stage(csr_array(a), csr_array(b), value, spread, np.sign(value), shared, old, covariance, full)
+    found = solve_stage(csr_array(a), csr_array(b), Loads(value, spread, np.sign(value), shared), old, covariance, full)
     assert not found.lost
     parts = (found.values, found.covariance, found.cross, found.residual, found.leverage)
     for got, wanted in zip(parts, in_full(*given), strict=True):

@@ -61,7 +61,9 @@ def test_zigzag_executes_do_not_depend_on_the_room_for_them(coefficients, model)
     vehicle = coefficients.vehicle
     state, controls, trim = initial_state(case, vehicle, model)
     settings = settings_of(case, vehicle, state, controls, trim)
-    few, many = (maneuver.fly_logged(model, settings, state, controls, 0.05, 3200, 20, room=n) for n in (2, 256))
+    few, many = (
+        maneuver.fly_logged(model, settings, state, controls, maneuver.Clock(0.05, 3200, 20), room=n) for n in (2, 256)
+    )
     assert len(many.executes) > 4
     assert np.array_equal(few.executes, many.executes)
     assert np.array_equal(few.record, many.record)

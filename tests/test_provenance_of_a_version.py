@@ -84,7 +84,7 @@ def test_the_same_is_in_the_summary_a_program_reads(fitted):
 
 def test_the_report_shows_it_in_the_order_it_was_done(fitted, tmp_path):
     _, db = fitted
-    page = html.unescape(Path(write_report(db, None, tmp_path, "bb2")["file"]).read_text("utf-8"))
+    page = html.unescape(Path(write_report(db, None, tmp_path, "bb2").file).read_text("utf-8"))
     words = [
         "tow.csv: kind steady, start_s 3.0",
         "1; start-up transient MSER",
@@ -120,7 +120,7 @@ def test_a_version_from_before_says_so_and_has_the_same_digest(fitted, tmp_path)
     db = str(tmp_path / "db")
     commit(db, done.rows, {})
     assert versions(db)[-1].digest == done.digest
-    assert "Not stored with the commit." in Path(write_report(db, None, tmp_path, "bb2")["file"]).read_text("utf-8")
+    assert "Not stored with the commit." in Path(write_report(db, None, tmp_path, "bb2").file).read_text("utf-8")
 
 
 def said(*arguments: str) -> dict:

@@ -109,7 +109,7 @@ def test_neighbour_in_the_sign_checks_is_this_boat(printed):
 
 def test_report_shows_the_published_derivatives_as_its_own(both, tmp_path):
     """Slopes of the assembled model, beside the print: the ratio is one."""
-    page = Path(write_report(both, None, tmp_path, "suboff")["file"]).read_text("utf-8")
+    page = Path(write_report(both, None, tmp_path, "suboff").file).read_text("utf-8")
     assert page.count("given by the source as a coefficient, not by runs") == 25
     assert page.count("\N{MINUS SIGN}0.027834") >= 3
     # The errata are of BB2's thesis: another boat's page has none.

@@ -319,7 +319,7 @@ def test_the_report_shows_the_findings_of_the_commit(rows, bundled, tmp_path):
     few = rows[rows["coefficient"].isin(["KT", "w_T"])]
     for number, metadata in enumerate(({"checks": json.dumps([f.as_json() for f in bundled])}, {})):
         commit(str(tmp_path / f"db{number}"), few, metadata)
-        page = Path(write_report(str(tmp_path / f"db{number}"), 0, tmp_path / str(number), "bb2")["file"]).read_text(
+        page = Path(write_report(str(tmp_path / f"db{number}"), 0, tmp_path / str(number), "bb2").file).read_text(
             "utf-8"
         )
         section = page.split('<section id="checks">')[1].split("</section>")[0]

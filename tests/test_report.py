@@ -63,7 +63,7 @@ def coefficients(database):
 
 @pytest.fixture(scope="module")
 def path(database, tmp_path_factory):
-    return Path(write_report(database, None, tmp_path_factory.mktemp("pages") / "new", "bb2")["file"])
+    return Path(write_report(database, None, tmp_path_factory.mktemp("pages") / "new", "bb2").file)
 
 
 @pytest.fixture(scope="module")
@@ -177,7 +177,7 @@ def test_page_of_a_sparse_commit_without_metadata(tmp_path, database):
     rows, _ = read_rows(database, vehicle="bb2")
     db = str(tmp_path / "db")
     commit(db, rows[rows["coefficient"].isin(["KT", "X_uvw", "w_T"])], {})
-    page = Path(write_report(db, 0, tmp_path, "bb2")["file"]).read_text("utf-8")
+    page = Path(write_report(db, 0, tmp_path, "bb2").file).read_text("utf-8")
     assert "FAIL: wrong sign" in page
     assert page.count('class="absent"') == len(vehicle_terms(load_vehicle("bb2"))) - 3
     assert "does not name its input files" in page

@@ -142,7 +142,7 @@ def test_interpolated_loads_follow_the_exact_ones(boat, seaway):
     size = np.abs(exact).max(axis=0)
     worst = []
     for span in (0.4, 0.8):
-        sea = wave_loads.make_sea(seaway, *boat, span=span)
+        sea = wave_loads.make_sea(seaway, *boat, wave_loads.Summing(span))
         sums, out = wave_loads.passage(sea), np.zeros(len(size))
         miss = np.zeros(len(size))
         for t, y, known in zip(times, path, exact, strict=True):

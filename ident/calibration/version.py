@@ -6,7 +6,6 @@ import json
 import os
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -15,7 +14,7 @@ from numpy.typing import NDArray
 from ident.calibration.cautions import UNLEARNT, cautions
 from ident.calibration.estimate import Estimate
 from ident.calibration.estimate import calibrate as most_probable
-from ident.calibration.file import Parameter, apply, load_calibration, parameters
+from ident.calibration.file import CalibrationFile, Parameter, apply, load_calibration, parameters
 from ident.calibration.posterior import emcee, sample
 from ident.calibration.problem import Channel, Problem, problem
 from ident.calibration.result import (
@@ -244,7 +243,8 @@ def _told(each: Callable[[str], None]) -> Tell:
     each=("work", "tell", _told),
     posterior="diagnostics",
     sensitivity="diagnostics",
-    seed="diagnostics",
+    # Zero was what it was without; now it is refused where nothing is drawn.
+    seed=("diagnostics", "seed", lambda seed: seed or None),
 )
 def calibrate(
     name: str | os.PathLike[str],
@@ -293,16 +293,7 @@ def calibrate(
     if spec.starts_from == "runs":
         rows = measured_rows(rows)
     every = problem(spec, where, vehicle, rows, parameters(spec, vehicle, rows, where))
-    solved, learnt = _learnt(every, spec.choose, left_out, diagnostics, work)
-    summary = CalibrationSummary(
-        calibration=spec.name,
-        vehicle=vehicle.name,
-        parent=base.number,
-        parent_digest=base.digest,
-        source=spec.source,
-        file_digest=file_digest,
-        **learnt,
-    )
+    solved, summary = _learnt(every, spec, (base, file_digest), left_out, diagnostics, work)
     done = calibrated_rows(rows, *_in_force(solved))
     number, new = commit(os.fspath(db), done, _metadata(base, solved.task, summary, message), work.wait)
     return Calibrated(summary, number, new, digest(done))
@@ -323,9 +314,9 @@ def _refuse_idle(diagnostics: Diagnostics, work: Work) -> None:
 
 
 def _learnt(
-    every: Problem, choose: str, left_out: bool, diagnostics: Diagnostics, work: Work
-) -> tuple[Solved, dict[str, Any]]:
-    """The multipliers, and what a summary says of them."""
+    every: Problem, spec: CalibrationFile, of: tuple[Version, str], left_out: bool, diagnostics: Diagnostics, work: Work
+) -> tuple[Solved, CalibrationSummary]:
+    """The multipliers, and what is said of them; ``of`` are the parent and the digest of the file."""
 
     def each(text: str) -> None:
         work.tell(text, 0, 0)
@@ -334,7 +325,7 @@ def _learnt(
     # Before the search, so that a size which cannot be is refused at once.
     size = diagnostics.sensitivity
     shares = what_decides(every, size, seed, workers, each) if size else None
-    solved = _solved(every, choose, workers, each)
+    solved = _solved(every, spec.choose, workers, each)
     task, estimate = solved.task, solved.estimate
     without = _left_out(task, estimate, workers, each) if left_out else []
     draws = diagnostics.posterior
@@ -344,17 +335,24 @@ def _learnt(
         for key, rmse in estimate.rms.items()
     ]
     evidence = {"chosen": solved.comparison.log_evidence, "all": solved.comparison.every}
-    return solved, {
-        "trained": list(dict.fromkeys(f"{c.key[0]}:{c.key[1]}" for c in task.channels)),
-        "groups": _groups(every, solved),
-        "covariance": estimate.covariance.tolist(),
-        "series": series,
-        "left_out": without,
-        "warnings": cautions(task, estimate, without, drawn),
-        "evidence": {which: float(f"{value:.4g}") for which, value in evidence.items()},
-        "sampled": drawn,
-        "sensitivity": shares,
-    }
+    base, file_digest = of
+    return solved, CalibrationSummary(
+        calibration=spec.name,
+        vehicle=every.vehicle.name,
+        parent=base.number,
+        parent_digest=base.digest,
+        source=spec.source,
+        file_digest=file_digest,
+        trained=list(dict.fromkeys(f"{c.key[0]}:{c.key[1]}" for c in task.channels)),
+        groups=_groups(every, solved),
+        covariance=estimate.covariance.tolist(),
+        series=series,
+        left_out=without,
+        warnings=cautions(task, estimate, without, drawn),
+        evidence={which: float(f"{value:.4g}") for which, value in evidence.items()},
+        sampled=drawn,
+        sensitivity=shares,
+    )
 
 
 def _metadata(base: Version, task: Problem, summary: CalibrationSummary, message: str) -> dict[str, str]:

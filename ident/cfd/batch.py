@@ -14,7 +14,7 @@ from ident.captive.combine import combined
 from ident.captive.conversions import to_full_scale
 from ident.captive.run_table import STATES, run_table
 from ident.cfd.case import Case
-from ident.cfd.matrix import Matrix, is_matrix, read_matrix, write_matrix
+from ident.cfd.matrix import Matrix, MeshedBoat, is_matrix, read_matrix, write_matrix
 from ident.cfd.surfaces import Lines, read_surface
 from ident.cfd.template import Template, read_template
 from ident.output import Tell, silent
@@ -127,7 +127,9 @@ def plan_cases(
         return Batch(plan, lines, None, names, tuple(dict.fromkeys(need.name for need in wanted)))
     if shared.disc and is_matrix(place) and any(c.test == "self_propulsion" for c in read_matrix(place).cases):
         shared = shared.model_copy(update={"disc": []})
-    matrix = write_matrix(plan.runs, campaign.vehicle, vehicle_file, lines, shared, place, str(made_by), tell)
+    matrix = write_matrix(
+        plan.runs, MeshedBoat(campaign.vehicle, vehicle_file, lines), shared, place, str(made_by), tell
+    )
     return Batch(plan, lines, matrix, names)
 
 

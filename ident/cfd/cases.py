@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from ident.cfd import dictionaries as d
 from ident.cfd import scripts
+from ident.cfd.case import Case
 from ident.cfd.grids import Box, block_mesh, box, snappy
 from ident.cfd.motions import Motion
 from ident.cfd.template import Template
@@ -168,26 +169,42 @@ def _script(path: Path, text: str) -> None:
     path.chmod(0o755)
 
 
-def write_case(
-    folder: Path, mesh: Path, motion: Motion, body: Body, template: Template, centre: Array, speed: float, wall: float
-) -> None:
+@dataclass
+class PlannedCase:
+    """A case with what it is made of, before it is written.
+
+    Attributes
+    ----------
+    case : As ``campaign.toml`` and the matrix name it.
+    motion : What it does.
+    body : The boat in mesh axes.
+    centre : Moment point in mesh axes [m].
+    speed : Of the flow past the hull, for the turbulence of the inflow [m/s].
+    """
+
+    case: Case
+    motion: Motion
+    body: Body
+    centre: Array
+    speed: float
+
+
+def write_case(folder: Path, mesh: Path, planned: PlannedCase, template: Template, wall: float) -> None:
     """A case folder that runs by its ``Allrun``.
 
     Parameters
     ----------
     folder : Of the case.
     mesh : Folder of its mesh.
-    motion : What it does.
-    body : The boat in mesh axes.
+    planned : The case.
     template : What all cases share.
-    centre : Moment point in mesh axes [m].
-    speed : Of the flow past the hull, for the turbulence of the inflow [m/s].
     wall : Length of a cell on the wall [m].
     """
+    motion, body = planned.motion, planned.body
     system, constant = folder / "system", folder / "constant"
     walls = list(body.patches)
     parts = {part: list(of_part) for part, of_part in template.parts.items()}
-    write_dictionary(system / "controlDict", d.control(template, motion, parts, centre, wall))
+    write_dictionary(system / "controlDict", d.control(template, motion, parts, planned.centre, wall))
     write_dictionary(system / "fvSchemes", d.schemes(motion))
     write_dictionary(system / "fvSolution", d.solution(template, motion))
     write_dictionary(constant / "transportProperties", d.transport(template))
@@ -202,7 +219,7 @@ def write_case(
         cores = template.machine.cores
         split = {"numberOfSubdomains": cores, "method": "hierarchical", "coeffs": {"n": [cores, 1, 1]}}
         write_dictionary(system / "decomposeParDict", split)
-    fields = d.fields(template, motion, walls, body.surface_z is not None, speed, body.length)
+    fields = d.fields(template, motion, walls, body.surface_z is not None, planned.speed, body.length)
     for name, (dimensions, inner, patches) in fields.items():
         write_field(folder / "0.orig" / name, dimensions, inner, patches)
     _script(

@@ -18,7 +18,7 @@ from ident.captive.conversions import to_full_scale
 from ident.captive.run_table import STATES
 from ident.cfd import scripts
 from ident.cfd.case import Case
-from ident.cfd.cases import Body, Disc, write_case, write_mesh
+from ident.cfd.cases import Body, Disc, PlannedCase, write_case, write_mesh
 from ident.cfd.grids import GRIDS, wall_cell
 from ident.cfd.motions import UNWRITTEN, Motion, motion_of
 from ident.cfd.sources import write_campaign
@@ -78,22 +78,25 @@ def read_matrix(folder: Path) -> Matrix:
         raise InputError(str(path), f"cannot be read: {error}"[:200], text) from error
 
 
-@dataclass
-class _Written:
-    """A case with what it is made of, before it is written."""
+@dataclass(frozen=True)
+class MeshedBoat:
+    """The boat of a matrix.
 
-    case: Case
-    motion: Motion
-    body: Body
-    centre: Array
-    speed: float
+    Attributes
+    ----------
+    vehicle : Its geometry.
+    file : Bundled name or path of its vehicle file, for the campaign.
+    lines : Its surface, checked.
+    """
+
+    vehicle: Vehicle
+    file: str
+    lines: Lines
 
 
 def write_matrix(
     runs: pd.DataFrame,
-    vehicle: Vehicle,
-    vehicle_file: str,
-    lines: Lines,
+    boat: MeshedBoat,
     template: Template,
     out: Path,
     where: str,
@@ -104,8 +107,7 @@ def write_matrix(
     Parameters
     ----------
     runs : Of a plan: program frame, SI, radians, full scale.
-    vehicle, vehicle_file : The boat, and its name or path for the campaign.
-    lines : Its surface, checked.
+    boat : Of the runs.
     template : What all cases share.
     out : Folder to write to; a matrix that is there is added to.
     where : The template file, for messages.
@@ -125,19 +127,19 @@ def write_matrix(
     if out.is_dir() and any(out.iterdir()) and not is_matrix(out) and not is_begun(out):
         raise InputError(str(out), "a folder that is not empty", "a new folder, or one that ident plan --cases wrote")
     matrix = read_matrix(out) if is_matrix(out) else Matrix(out)
-    planned = _prepared(runs, vehicle, lines, template, matrix, where)
+    planned = _prepared(runs, boat.vehicle, boat.lines, template, matrix, where)
     with workshop(out) as place:
         _write_folders(planned, template, out, place, tell)
         matrix.cases += [one.case for one in planned]
         matrix.new = [one.case.run_id for one in planned]
         _write_scripts(out, matrix, template)
-        write_campaign(out, matrix.cases, vehicle, vehicle_file, template)
+        write_campaign(out, matrix.cases, boat.vehicle, boat.file, template)
         with whole(out / MATRIX) as part:
             part.write_text(json.dumps(matrix.to_dict(), indent=1) + "\n", encoding="utf-8")
     return matrix
 
 
-def _write_folders(planned: list[_Written], template: Template, out: Path, place: Path, tell: Tell) -> None:
+def _write_folders(planned: list[PlannedCase], template: Template, out: Path, place: Path, tell: Tell) -> None:
     """A folder for each mesh that is not there yet, and one for every case and grid: whole, from ``place``."""
     meshes: dict[str, Body] = {}
     for one in planned:
@@ -155,7 +157,7 @@ def _write_folders(planned: list[_Written], template: Template, out: Path, place
         for grid in names:
             below, mesh = Path("cases") / one.case.run_id / grid, place / "meshes" / one.case.mesh / grid
             wall = wall_cell(template, one.body.length, grid)
-            write_case(place / below, mesh, one.motion, one.body, template, one.centre, one.speed, wall)
+            write_case(place / below, mesh, one, template, wall)
             _moved(place / below, out / below)
     tell("writing cases", len(planned), len(planned))
 
@@ -170,13 +172,13 @@ def _moved(made: Path, target: Path) -> None:
 
 def _prepared(
     runs: pd.DataFrame, vehicle: Vehicle, lines: Lines, template: Template, matrix: Matrix, where: str
-) -> list[_Written]:
+) -> list[PlannedCase]:
     """Every run as a case, none written yet."""
     scaled = to_full_scale(runs, 1.0 / template.surface.ratio).reset_index(drop=True)
     start = max((int(c.run_id[1:]) for c in matrix.cases), default=0)
     matrix.left_out = {}
     _one_depth(scaled, matrix.cases, template, lines.length, where)
-    planned: list[_Written] = []
+    planned: list[PlannedCase] = []
     for _, run in scaled.iterrows():
         name = f"P{start + len(planned) + 1:03d}"
         test, part = str(run["test"]), str(run["part"])
@@ -203,7 +205,7 @@ def _one_depth(runs: pd.DataFrame, cases: list[Case], template: Template, length
         raise InputError(f"{where}, key flow.free_surface", wrong, text)
 
 
-def _case(name: str, run: pd.Series, vehicle: Vehicle, lines: Lines, template: Template, where: str) -> _Written:
+def _case(name: str, run: pd.Series, vehicle: Vehicle, lines: Lines, template: Template, where: str) -> PlannedCase:
     """One run of the plan."""
     test, part = str(run["test"]), str(run["part"])
     place = f"run {name} ({test}, {part})"
@@ -245,7 +247,7 @@ def _case(name: str, run: pd.Series, vehicle: Vehicle, lines: Lines, template: T
         duration=motion.duration,
         iterations=template.steady.iterations if motion.steady else 0,
     )
-    return _Written(case, motion, body, np.zeros(3), _speed(run, motion, length))
+    return PlannedCase(case, motion, body, np.zeros(3), _speed(run, motion, length))
 
 
 def _surface(run: pd.Series, vehicle: Vehicle, lines: Lines, ratio: float, mesh: str, place: str) -> tuple[float, str]:
@@ -276,13 +278,13 @@ def _speed(run: pd.Series, motion: Motion, length: float) -> float:
     return max(steady, 0.5 * length * float(np.linalg.norm(rates)), reached)
 
 
-def _propelled(start: int, vehicle: Vehicle, lines: Lines, template: Template, where: str) -> list[_Written]:
+def _propelled(start: int, vehicle: Vehicle, lines: Lines, template: Template, where: str) -> list[PlannedCase]:
     """Each self-propelled run with its towed twin."""
     propeller = vehicle.needed_propeller("an actuator disc")
     if propeller.position is None:
         raise InputError(f"vehicle {vehicle.name}, key propeller.position", "nothing", "where the disc is")
     ratio = template.surface.ratio
-    out: list[_Written] = []
+    out: list[PlannedCase] = []
     for disc_point in template.disc:
         speed, depth = disc_point.speed_mps / math.sqrt(ratio), disc_point.depth_m / ratio
         state = pd.Series({**dict.fromkeys(STATES, math.nan), "U": speed, "alpha": 0.0, "beta": 0.0, "D0": depth})
@@ -306,7 +308,7 @@ def _propelled(start: int, vehicle: Vehicle, lines: Lines, template: Template, w
             thrust_n=thrust,
             thrust_source=disc_point.source,
         )
-        out += [towed, _Written(case, motion, body, np.zeros(3), towed.speed)]
+        out += [towed, PlannedCase(case, motion, body, np.zeros(3), towed.speed)]
     return out
 
 

@@ -66,21 +66,13 @@ def fly(**options: Any) -> None:
     """
     asked = FlyOptions(**options)
     asked.check()
-    from ident.exports.fly import Draws, fly_to_file
+    from ident.exports.fly import Draws, Recording, fly_to_file
 
     draws = Draws(asked.samples, asked.seed or 0, _shares(asked.quantiles)) if asked.samples else None
     console = console_for(quiet=asked.json_path == "-")
     with equilibrium_of(asked.case), console.status("flying the case"):
-        written = fly_to_file(
-            asked.case,
-            asked.db,
-            asked.version,
-            asked.vehicle,
-            asked.out,
-            every=asked.every,
-            draws=draws,
-            loads=asked.loads,
-        )
+        recording = Recording(asked.every, draws, asked.loads)
+        written = fly_to_file(asked.case, asked.db, asked.version, asked.vehicle, asked.out, recording)
     console.print(f"history: {on_screen(written.file)}, {written.records} records", highlight=False)
     if asked.json_path:
         emit(written.to_dict(), asked.json_path)

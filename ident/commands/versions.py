@@ -48,7 +48,7 @@ def report(
              ident validate --all --json board.json && ident report --vehicle bb2 --scoreboard board.json
     """
     from ident.report.interactive import plotly
-    from ident.report.page import reported_vehicles, write_report
+    from ident.report.page import Additions, reported_vehicles, write_report
 
     if beside and not interactive:
         raise click.UsageError("--beside changes nothing without --interactive")
@@ -56,13 +56,14 @@ def report(
         plotly()
 
     console = console_for(quiet=json_path == "-")
+    additions = Additions(interactive, beside, scoreboard)
     done = []
     for name in [vehicle] if vehicle is not None else reported_vehicles(db, version):
         with console.status(f"drawing every coefficient of {on_screen(name)}"):
-            done.append(write_report(db, version, out, name, interactive, beside, 0, scoreboard))
-        console.print(f"report: {on_screen(done[-1]['file'])}", highlight=False)
+            done.append(write_report(db, version, out, name, additions, 0))
+        console.print(f"report: {on_screen(done[-1].file)}", highlight=False)
     if json_path:
-        emit(done[0] if len(done) == 1 else done, json_path)
+        emit(done[0].to_dict() if len(done) == 1 else [one.to_dict() for one in done], json_path)
 
 
 @click.command()

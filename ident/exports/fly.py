@@ -41,6 +41,22 @@ class Draws:
 
 
 @dataclass(frozen=True)
+class Recording:
+    """What is written of a flight.
+
+    Attributes
+    ----------
+    every : Time between records [s], as the case says when None.
+    draws : Flights of drawn coefficient sets instead, to ``.nc``.
+    loads : ``part`` or ``coefficient``: loads on the boat from each of them beside the motion, see ``with_loads``.
+    """
+
+    every: float | None = None
+    draws: Draws | None = None
+    loads: str | None = None
+
+
+@dataclass(frozen=True)
 class Written:
     """A flight written to a file.
 
@@ -72,10 +88,7 @@ def fly_to_file(
     version: int | None = None,
     vehicle_name: str | None = None,
     out: Path | None = None,
-    *,
-    every: float | None = None,
-    draws: Draws | None = None,
-    loads: str | None = None,
+    recording: Recording | None = None,
 ) -> Written:
     """Fly a case and write its history.
 
@@ -85,9 +98,7 @@ def fly_to_file(
     db, version : Database path or URL, and version, latest when None.
     vehicle_name : Bundled vehicle or path to a vehicle file, instead of the case's.
     out : ``.csv``, ``.parquet`` or ``.nc``; named after case and version when None.
-    every : Time between records [s], as the case says when None.
-    draws : Flights of drawn coefficient sets instead, to ``.nc``.
-    loads : ``part`` or ``coefficient``: loads on the boat from each of them beside the motion, see ``with_loads``.
+    recording : What is written of the flight; states at the case's own times when None.
 
     Raises
     ------
@@ -97,8 +108,10 @@ def fly_to_file(
     sim.flight.trim.NoEquilibrium
         When the case starts from self-propulsion and there is none.
     """
+    recording = recording or Recording()
+    draws = recording.draws
     case, where = load_case(name)
-    case = sampled(case, every)
+    case = sampled(case, recording.every)
     vehicle = load_vehicle(vehicle_name) if vehicle_name is not None else load_vehicle(case.vehicle, beside=where)
     boat = Fleet(db, version).boat(vehicle)
     database = {"path": db, "version": boat.commit.number, "digest": boat.commit.digest}
@@ -110,7 +123,8 @@ def fly_to_file(
     if draws:
         records, ends, samples = _write_samples(case, boat, draws, attributes, path)
         return Written(str(path), case.name, vehicle.name, database, records, ends, samples)
-    return Written(str(path), case.name, vehicle.name, database, *_write_flight(case, boat, loads, attributes, path))
+    written = _write_flight(case, boat, recording.loads, attributes, path)
+    return Written(str(path), case.name, vehicle.name, database, *written)
 
 
 def _write_samples(

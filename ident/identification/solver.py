@@ -19,7 +19,7 @@ from ident.identification.equations import ALWAYS, BEYOND, NONZERO, Equations, F
 from ident.identification.facilities import Left
 from ident.identification.nodes import Node, by_coefficient, key_point, table_points
 from ident.identification.noted import FitWarning, UnusedLoad
-from ident.identification.stage_solve import solve_stage
+from ident.identification.stage_solve import Loads, solve_stage
 from sim.boat.catalogue import ACCELERATIONS, OUTPUTS, Term
 from sim.boat.forces import axis_values, boat_features, body_velocity, multiplier, plane_features
 from sim.boat.parts import Mirror, Point, mirror_of, parts_of, vehicle_terms
@@ -271,8 +271,8 @@ class Solver:
         a, b = equations.design(first)
         sign = np.sign(equations.value)
         shared = runs.origins()[equations.run] * len(MEASURED) + equations.output
-        loads = (equations.value, equations.sigma, sign, shared)
-        solution = solve_stage(a, b, *loads, self.values, self.covariance, spread=spread)
+        loads = Loads(equations.value, equations.sigma, sign, shared)
+        solution = solve_stage(a, b, loads, self.values, self.covariance, spread=spread)
         for node in solution.lost:
             bad = self.nodes[first + node]
             text = f"{bad.part} at {bad.point}: the runs cannot tell it from other terms; dropped"

@@ -194,13 +194,35 @@ class Stage:
         return np.divide(np.abs(self.residual), spread, out=np.zeros(len(sigma)), where=compared)
 
 
+@dataclass(frozen=True)
+class Loads:
+    """The measured loads of a stage's equations, with their errors.
+
+    Attributes
+    ----------
+    measured, sigma : (equations,) loads and their standard errors.
+    sign : (equations,) sign with which each load has the error it shares; 0 where it shares none.
+    shared : (equations,) number of the error that each load has.
+    """
+
+    measured: Array
+    sigma: Array
+    sign: Array
+    shared: Indices
+
+    def errors(self) -> csr_array:
+        """(equations, errors): independent errors of one standard deviation, and their sign in each load."""
+        number = np.where(self.sign == 0.0, self.shared.max(initial=0) + 1 + np.arange(len(self.sigma)), self.shared)
+        _, column = np.unique(number, return_inverse=True)
+        size = np.where(self.sign == 0.0, self.sigma, self.sign * self.sigma)
+        shape = (len(self.sigma), int(column.max(initial=-1)) + 1)
+        return csr_array((size, (np.arange(len(self.sigma)), column)), shape=shape)
+
+
 def solve_stage(
     a: csr_array,
     b: csr_array,
-    measured: Array,
-    sigma: Array,
-    sign: Array,
-    shared: Indices,
+    loads: Loads,
     values: Array,
     covariance: Array,
     full: int = _FULL,
@@ -216,10 +238,8 @@ def solve_stage(
     Parameters
     ----------
     a, b : (equations, new) and (equations, old) factors.
-    measured, sigma : (equations,) loads and their standard errors.
-    sign : (equations,) sign with which each load has the error it shares; 0 where it shares none.
-    shared : (equations,) number of the error that each load has.
-    values, covariance : (old,) and (old, old) found before.
+    loads : Of the equations.
+    values, covariance : (old,) and (old, old) known from earlier stages.
     full : Equations up to which matrices are full.
     spread : Solves the blocks of unknowns.
 
@@ -227,12 +247,11 @@ def solve_stage(
     -------
     Stage.
     """
-    errors = _errors(sigma, sign, shared)
-    design, known = (a.toarray(), b.toarray()) if len(sigma) <= full else (a, b)
-    gain, lost = gain_matrix(design, weights(design, sigma), spread)
-    rest = measured - known @ values
+    design, known = (a.toarray(), b.toarray()) if len(loads.sigma) <= full else (a, b)
+    gain, lost = gain_matrix(design, weights(design, loads.sigma), spread)
+    rest = loads.measured - known @ values
     new = gain @ rest
-    noise = gain @ errors
+    noise = gain @ loads.errors()
     carried = _full(gain @ known)
     seen = carried @ covariance
     leverage = (
@@ -241,14 +260,6 @@ def solve_stage(
         else np.asarray(design.multiply(gain.T).sum(axis=1)).ravel()
     )
     return Stage(new, _full(noise @ noise.T) + seen @ carried.T, -seen, lost, rest - design @ new, leverage)
-
-
-def _errors(sigma: Array, sign: Array, shared: Indices) -> csr_array:
-    """(equations, errors): independent errors of one standard deviation, and their sign in each load."""
-    number = np.where(sign == 0.0, shared.max(initial=0) + 1 + np.arange(len(sigma)), shared)
-    _, column = np.unique(number, return_inverse=True)
-    size = np.where(sign == 0.0, sigma, sign * sigma)
-    return csr_array((size, (np.arange(len(sigma)), column)), shape=(len(sigma), int(column.max(initial=-1)) + 1))
 
 
 def _full(matrix: Matrix) -> Array:

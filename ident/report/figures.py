@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
-from ident.drawing import begun, fixed_labels, margins, scientific
+from ident.drawing import Margins, begun, fixed_labels, place_panels, scientific
 from ident.text import in_figure
 from sim.boat import catalogue
 from sim.boat.catalogue import Term
@@ -286,7 +286,7 @@ def _frame(rows: int, columns: int, panels: list[Panel], entries: int) -> tuple[
     width = left + 0.15 + 2.9 * columns + between * (columns - 1)
     height = top + bottom + tall * rows + gap * (rows - 1)
     figure = Figure(figsize=(width, height))
-    margins(figure, rows, columns, left=left, top=top, bottom=bottom, between=between, gap=gap)
+    place_panels(figure, rows, columns, Margins(left=left, top=top, bottom=bottom, between=between, gap=gap))
     return figure, figure.subplots(rows, columns, squeeze=False)
 
 

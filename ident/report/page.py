@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import re
 from collections.abc import Sequence
+from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from importlib.resources import files
 from pathlib import Path
@@ -12,22 +13,22 @@ from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
-from ident.analysis.derivatives import checks, derivatives
+from ident.analysis.derivatives import Derivative, checks, derivatives
 from ident.checks.findings import SEVERITIES, spans
 from ident.database.provenance import steps
 from ident.fitting.notes import group_unused, group_warnings, stored_unused, stored_warnings
 from ident.output import whole
-from ident.report.figures import Picture, equations, figures_begun, quality_colours
+from ident.report.coverage import QualityWord, coverage, quality_words
+from ident.report.figures import Picture, figures_begun, quality_colours
 from ident.report.interactive import Drawn, write_interactive
 from ident.report.score import read_score
 from ident.report.values import Run, runs_of, term_anchor, term_pages
 from ident.report.values import number as _figure
-from sim.boat import catalogue
-from sim.boat.catalogue import RULES, Term
+from sim.boat.catalogue import RULES
 from sim.boat.coefficients import Coefficients
 from sim.boat.database import Version, axis_columns, own_version, read_rows
 from sim.boat.mass import Environment
-from sim.boat.parts import parts_of, vehicle_terms
+from sim.boat.parts import vehicle_terms
 from sim.boat.vehicle import Vehicle, load_vehicle
 from sim.files.errors import InputError
 from sim.files.frames import PROGRAM
@@ -81,74 +82,29 @@ def _provenance(db: str, number: int, commit: Version, vehicle: Vehicle) -> list
     ]
 
 
-def _ranges(term: Term, rows: pd.DataFrame) -> list[str]:
-    """What the runs cover along each axis, in database units."""
-    ranges = []
-    for name in term.axes:
-        axis = catalogue.axes()[name]
-        values = sorted(rows[axis.column].unique())
-        unit = "" if axis.unit == "1" else f" {axis.unit}"
-        if len(values) == 1:
-            text = f"{_figure(values[0])}{unit} only"
-        elif name == "D0":
-            text = ", ".join(_figure(v) for v in values) + unit
-        else:
-            text = f"{_figure(values[0])} to {_figure(values[-1])}{unit} ({len(values)})"
-        ranges.append(f"{name}: {text}")
-    return ranges
+@dataclass(frozen=True)
+class Signs:
+    """Signs of the linear derivatives beside those of a stable boat.
+
+    Attributes
+    ----------
+    speed, depth : At which they are taken [m/s, m].
+    rows : The derivatives.
+    sources : Of the expectations.
+    """
+
+    speed: float
+    depth: float
+    rows: list[Derivative]
+    sources: list[str]
+
+    @property
+    def passed(self) -> int:
+        """How many are as expected."""
+        return sum(d.ok for d in self.rows)
 
 
-def _notes(term: Term, rows: pd.DataFrame) -> list[str]:
-    """What a reader should know before trusting the coefficient off its points."""
-    columns = {a: c for c, a in axis_columns().items()}
-    single = [a for a in term.axes if rows[columns[a]].nunique() == 1]
-    notes = [f"one {a} only: used at every {a}" for a in single]
-    if {"alpha", "beta"} <= set(term.axes) - set(single):
-        both = (rows[columns["alpha"]] != 0.0) & (rows[columns["beta"]] != 0.0)
-        if not both.any():
-            notes.append("no run has alpha and beta together: superposed")
-    if (rows["origin"] == "published").any():
-        notes.append("given by the source as a coefficient, not by runs")
-    elif not (rows["origin"] == "measured").any():
-        notes.append("all from the partner plane's runs by the mirror")
-    return notes
-
-
-def _coverage(vehicle: Vehicle, rows: pd.DataFrame, factors: dict[str, float]) -> list[dict[str, Any]]:
-    """One row a term of the vehicle's set, with data or absent."""
-    coverage = []
-    for term in vehicle_terms(vehicle):
-        of_term = rows[rows["coefficient"] == term.name]
-        parts = parts_of(term, vehicle)
-        row: dict[str, Any] = {
-            "symbol": term.name,
-            "group": term.group,
-            "part": parts[0] if len(parts) == 1 else f"{of_term['part'].nunique()} of {len(parts)} sections",
-            "equation": equations(term),
-            "multiplier": term.multiplier or "1",
-            "tests": " ".join(term.tests),
-            "absent": of_term.empty,
-        }
-        if not of_term.empty:
-            origin = of_term["origin"].value_counts()
-            # In the order of the vocabulary: of words with one factor a set has any order.
-            words = [q for q in factors if q in set(of_term["quality"])]
-            row |= {
-                "measured": int(origin.get("measured", 0) + origin.get("published", 0)),
-                "mirror": int(origin.get("mirror", 0)),
-                "symmetry": int(origin.get("symmetry", 0)),
-                "ranges": _ranges(term, of_term),
-                "quality": words[-1] if words else "",
-                "worst_points": int((of_term["quality"] == words[-1]).sum()) if words else 0,
-                "worst": float(of_term["worst_residual"].max()),
-                "rules": [f"{a}: {r}" for a, r in term.extrapolation.items()],
-                "notes": _notes(term, of_term),
-            }
-        coverage.append(row)
-    return coverage
-
-
-def _signs(coefficients: Coefficients, rows: pd.DataFrame) -> dict[str, Any]:
+def _signs(coefficients: Coefficients, rows: pd.DataFrame) -> Signs:
     """Derivatives at the largest tabulated speed and depth, where most data are."""
     columns = {a: c for c, a in axis_columns().items()}
     speed, depth = (float(rows[columns[a]].max()) for a in ("U", "D0"))
@@ -160,24 +116,7 @@ def _signs(coefficients: Coefficients, rows: pd.DataFrame) -> dict[str, Any]:
     else:
         signs = []
     sources = list(dict.fromkeys(c.source for c in checks() if c.suboff is not None))
-    return {"speed": speed, "depth": depth, "rows": signs, "passed": sum(d.ok for d in signs), "sources": sources}
-
-
-def _vocabulary(commit: Version, rows: pd.DataFrame) -> list[dict[str, Any]]:
-    """Quality words by rising factor, with the number of points behind each."""
-    known = commit.stored("quality", {})
-    counts = rows["quality"].value_counts()
-    words = sorted({*known, *(q for q in counts.index if q)}, key=lambda w: known.get(w, {}).get("factor", 1.0))
-    words.sort(key=lambda w: (known.get(w, {}).get("factor", 1.0), list(known).index(w) if w in known else 0))
-    return [
-        {
-            "word": w,
-            "factor": known.get(w, {}).get("factor"),
-            "meaning": known.get(w, {}).get("meaning", "not in the commit's vocabulary"),
-            "points": int(counts.get(w, 0)),
-        }
-        for w in words
-    ]
+    return Signs(speed, depth, signs, sources)
 
 
 def _calibration(commit: Version, vehicle: Vehicle, number: int) -> dict[str, Any] | None:
@@ -223,12 +162,12 @@ def _content(
     vehicle: Vehicle,
     rows: pd.DataFrame,
     commit: Version,
-    vocabulary: list[dict[str, Any]],
+    vocabulary: list[QualityWord],
 ) -> dict[str, Any]:
     """Everything the template shows but the pictures and what refers to them."""
     from markupsafe import Markup
 
-    coverage = _coverage(vehicle, rows, {q["word"]: q["factor"] or 1.0 for q in vocabulary})
+    terms = coverage(vehicle, rows, {q.word: q.factor or 1.0 for q in vocabulary})
     columns = {a: c for c, a in axis_columns().items()}
     combined = (rows[columns["alpha"]].fillna(0.0) != 0.0) & (rows[columns["beta"]].fillna(0.0) != 0.0)
     return {
@@ -240,9 +179,9 @@ def _content(
         "provenance": [(k, v) for k, v in _provenance(db, number, commit, vehicle) if v],
         "steps": steps(commit.stored("conversions", {})),
         "inputs": commit.stored("inputs", {}),
-        "coverage": {g: [c for c in coverage if c["group"] == g] for g in dict.fromkeys(c["group"] for c in coverage)},
-        "present": [c for c in coverage if not c["absent"]],
-        "absent": [c for c in coverage if c["absent"]],
+        "coverage": {g: [c for c in terms if c.group == g] for g in dict.fromkeys(c.group for c in terms)},
+        "present": [c for c in terms if not c.absent],
+        "absent": [c for c in terms if c.absent],
         "combined": int(combined.sum()),
         "rules": RULES,
         "points": len(rows),
@@ -253,7 +192,7 @@ def _content(
         "severities": _severities(commit.stored("checks", []) if "checks" in commit.metadata else None),
         "calibration": _calibration(commit, vehicle, number),
         "vocabulary": vocabulary,
-        "colours": quality_colours(q["word"] for q in vocabulary),
+        "colours": quality_colours(q.word for q in vocabulary),
         "errata": _errata(vehicle),
     }
 
@@ -296,16 +235,65 @@ def _drawn(db: str, number: int, vehicle: str) -> tuple[pd.DataFrame, dict[str, 
     return rows, runs_of(rows, own_version(db, vehicle, number))
 
 
+@dataclass(frozen=True)
+class Additions:
+    """What stands on a report or beside it by request.
+
+    Attributes
+    ----------
+    interactive : Write a page with figures to turn and slice beside it, ``<vehicle>_v<version>_interactive.html``.
+    beside : Other versions drawn in the interactive figures.
+    scoreboard : JSON of ``ident validate --all`` of the same version: its errors stand on the page, each leading to
+        the values that its flight was computed from.
+    """
+
+    interactive: bool = False
+    beside: Sequence[int] = ()
+    scoreboard: Path | None = None
+
+
+@dataclass(frozen=True)
+class Written:
+    """A report that was written, and how much it shows.
+
+    Attributes
+    ----------
+    file : ``<vehicle>_v<version>.html``: images, style and all in the one file.
+    interactive : The page of figures beside it, where it was asked for.
+    vehicle : Its name.
+    database : ``path``, ``version`` and ``digest``.
+    rows, coefficients : Numbers of values and of terms with data.
+    absent : Terms without data.
+    signs : ``expected``, how many are as a stable boat has them, ``of`` how many.
+    findings : Of the quality checks by severity; None where the commit holds none.
+    warnings, unused : Numbers of warnings of the fit and of loads that it left out.
+    """
+
+    file: str
+    interactive: str | None
+    vehicle: str
+    database: dict[str, Any]
+    rows: int
+    coefficients: int
+    absent: list[str]
+    signs: dict[str, int]
+    findings: dict[str, int] | None
+    warnings: int
+    unused: int
+
+    def to_dict(self) -> dict[str, Any]:
+        """For a program to read."""
+        return asdict(self)
+
+
 def write_report(
     db: str,
     version: int | None,
     out: Path,
     vehicle: str,
-    interactive: bool = False,
-    beside: Sequence[int] = (),
+    additions: Additions | None = None,
     workers: int = 1,
-    scoreboard: Path | None = None,
-) -> dict[str, Any]:
+) -> Written:
     """Write the report of one vehicle at one database version.
 
     Parameters
@@ -314,16 +302,12 @@ def write_report(
     version : Version number, latest when None.
     out : Folder for the page; created when absent.
     vehicle : Bundled name or path to a vehicle file.
-    interactive : Write a page with figures to turn and slice beside it, ``<vehicle>_v<version>_interactive.html``.
-    beside : Other versions drawn in the interactive figures.
+    additions : What stands on the page or beside it by request.
     workers : Processes that draw the figures; 0 for all cores. The page does not depend on it.
-    scoreboard : JSON of ``ident validate --all`` of the same version: its errors stand on the page, each leading to the
-        values that its flight was computed from.
 
     Returns
     -------
-    What was written, for a program to read: ``file`` (``<vehicle>_v<version>.html``: images,
-    style and all in the one file), vehicle, version and digest, and how much it shows.
+    Written
 
     Raises
     ------
@@ -331,33 +315,41 @@ def write_report(
         When database, version or vehicle do not exist, the scoreboard is of another version, or the page cannot be
         written.
     """
+    additions = additions or Additions()
     boat = load_vehicle(vehicle)
     rows, number = read_rows(db, version, boat.name)
     rows = rows.reset_index(drop=True)
     commit = own_version(db, boat.name, number)
     path = Path(out) / f"{re.sub(r'[^A-Za-z0-9._-]', '_', boat.name)}_v{number}.html"
     page_of_figures = path.with_name(f"{path.stem}_interactive.html")
-    vocabulary = _vocabulary(commit, rows)
-    colours = quality_colours(q["word"] for q in vocabulary)
+    vocabulary = quality_words(commit, rows)
+    colours = quality_colours(q.word for q in vocabulary)
     with figures_begun(boat, rows, colours, number, workers) as pictures:
-        if interactive:
-            shown = [Drawn(n, *_drawn(db, n, boat.name)) for n in dict.fromkeys((number, *beside))]
+        if additions.interactive:
+            shown = [Drawn(n, *_drawn(db, n, boat.name)) for n in dict.fromkeys((number, *additions.beside))]
             write_interactive(boat, shown, page_of_figures, path.name)
         content = _content(db, number, boat, rows, commit, vocabulary) | {
-            "interactive": page_of_figures.name if interactive else "",
-            "score": read_score(scoreboard, commit.digest, len(rows)) if scoreboard else None,
+            "interactive": page_of_figures.name if additions.interactive else "",
+            "score": read_score(additions.scoreboard, commit.digest, len(rows)) if additions.scoreboard else None,
         }
         content |= _pictured(boat, rows, runs_of(rows, commit), pictures())
     page = _template().render(content)
     with whole(path) as part:
         part.write_text(page, encoding="utf-8")
-    said = {
-        "file": str(path),
-        "interactive": str(page_of_figures) if interactive else None,
-        "vehicle": boat.name,
-        "database": {"path": db, "version": number, "digest": commit.digest},
-    }
-    return said | _counts(content, len(rows), commit)
+    signs, checked = content["signs"], content["checks"]
+    return Written(
+        file=str(path),
+        interactive=str(page_of_figures) if additions.interactive else None,
+        vehicle=boat.name,
+        database={"path": db, "version": number, "digest": commit.digest},
+        rows=len(rows),
+        coefficients=len(content["present"]),
+        absent=[term.symbol for term in content["absent"]],
+        signs={"expected": signs.passed, "of": len(signs.rows)},
+        findings=_severities(checked),
+        warnings=len(commit.stored("warnings", [])),
+        unused=len(commit.stored("unused", [])),
+    )
 
 
 def _template() -> Template:
@@ -373,16 +365,3 @@ def _template() -> Template:
     )
     templates.filters |= {"spans": spans, "term_anchor": term_anchor, "plain": _figure}
     return templates.get_template("report.html.j2")
-
-
-def _counts(content: dict[str, Any], rows: int, commit: Version) -> dict[str, Any]:
-    """How much a page shows."""
-    return {
-        "rows": rows,
-        "coefficients": len(content["present"]),
-        "absent": [row["symbol"] for row in content["absent"]],
-        "signs": {"expected": content["signs"]["passed"], "of": len(content["signs"]["rows"])},
-        "findings": _severities(content["checks"]),
-        "warnings": len(commit.stored("warnings", [])),
-        "unused": len(commit.stored("unused", [])),
-    }

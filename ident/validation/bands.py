@@ -309,16 +309,31 @@ def _over_threads(
             raise
 
 
+@dataclass(frozen=True)
+class Execution:
+    """Who flies the samples, and who is told; the bands do not depend on it.
+
+    Attributes
+    ----------
+    workers : Threads; all cores when None.
+    each : Called with the number of samples flown since the last call.
+    dask : Address of a Dask scheduler that flies them instead.
+    chunk : Samples handed out at once.
+    """
+
+    workers: int | None = None
+    each: Callable[[int], None] = lambda done: None
+    dask: str | None = None
+    chunk: int = CHUNK
+
+
 def fly_samples(
     case: Case,
     vehicle: Vehicle,
     rows: pd.DataFrame,
     samples: int,
     seed: int = 0,
-    workers: int | None = None,
-    each: Callable[[int], None] = lambda done: None,
-    dask: str | None = None,
-    chunk: int = CHUNK,
+    execution: Execution | None = None,
 ) -> Bands:
     """Fly a case with coefficient sets drawn from the errors of the database.
 
@@ -328,10 +343,7 @@ def fly_samples(
     ----------
     case, vehicle, rows : What is flown, from which version.
     samples, seed : Number of coefficient sets and seed of the generator.
-    workers : Threads; all cores when None.
-    each : Called with the number of samples flown since the last call.
-    dask : Address of a Dask scheduler that flies them instead.
-    chunk : Samples handed out at once.
+    execution : Who flies them, and who is told; all cores of this machine when None.
 
     Returns
     -------
@@ -343,6 +355,8 @@ def fly_samples(
         When no sample has a self-propulsion state, for more samples than memory and disk hold, or as
         ``ident.validation.cluster.over_dask``.
     """
+    execution = execution or Execution()
+    chunk, workers, dask = execution.chunk, execution.workers, execution.dask
     _check_room(case, vehicle, rows, samples)
     estimates, correlation = correlation_matrix(rows)
     draws = draw(correlation, samples, seed)
@@ -354,7 +368,7 @@ def fly_samples(
     for place, chunk_flown in over_dask(dask, batch, chunks) if dask else _over_threads(batch, chunks, workers):
         for i, one in enumerate(chunk_flown, start=place * chunk):
             stacks.put(i, one)
-        each(len(chunk_flown))
+        execution.each(len(chunk_flown))
     return _bands(case, batch, stacks, draws, correlation, list(estimates["coefficient"]), seed)
 
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ident.drawing import fixed_labels, margins
+from ident.drawing import Margins, fixed_labels, place_panels
 from ident.output import whole
 from ident.text import in_figure
 from sim.boat.database import version_words
@@ -249,13 +249,13 @@ def _draw(done: FlownCase, bands: Bands | None) -> tuple[Any, Any]:
     kind = done.case.maneuver or ""
     if done.grid:
         figure = blank(11, 7)
-        margins(figure, 2, 2, bottom=_LEGEND)
+        place_panels(figure, 2, 2, Margins(bottom=_LEGEND))
         axes = figure.subplots(2, 2)
         _grid(done, np.ravel(axes))
         return figure, np.ravel(axes)[0]
     if kind in ("turning_circle", "direct_spiral", "reverse_spiral"):
         figure = blank(13, 7)
-        margins(figure, 2, 4, bottom=_LEGEND)
+        place_panels(figure, 2, 4, Margins(bottom=_LEGEND))
         spec = figure.add_gridspec(2, 4)
         main = figure.add_subplot(spec[:, :2])
         _track(done, main) if kind == "turning_circle" else _spiral(done, main)
@@ -269,7 +269,7 @@ def _draw(done: FlownCase, bands: Bands | None) -> tuple[Any, Any]:
     panels = len(channels) + bool(planes)
     rows, columns = (panels + 1) // 2, min(2, panels)
     figure = blank(11, 2.7 * rows + 0.8)
-    margins(figure, rows, columns, bottom=_LEGEND)
+    place_panels(figure, rows, columns, Margins(bottom=_LEGEND))
     axes = figure.subplots(rows, columns)
     for channel, axis in zip(channels, np.ravel(axes), strict=False):
         _series(done, channel, axis, bands)

@@ -220,11 +220,13 @@ class Validation:
         >>> bool((low <= high).all())
         True
         """
-        from ident.validation.bands import fly_samples
+        from ident.validation.bands import Execution, fly_samples
         from ident.validation.reliability import with_intervals
         from ident.validation.sweep import sampled_grid
 
-        bands = fly_samples(self.case, self.boat.vehicle, self.boat.rows, samples, seed, each=each, dask=dask)
+        bands = fly_samples(
+            self.case, self.boat.vehicle, self.boat.rows, samples, seed, Execution(each=each, dask=dask)
+        )
         bands = sampled_grid(self.case, self.boat.vehicle, self.boat.rows, bands)
         return replace(self, bands=bands, metrics=with_intervals(self.metrics, bands))
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ident.drawing import margins
+from ident.drawing import Margins, place_panels
 from ident.text import in_file_name
 from ident.validation.figures import DOWNWARDS, blank, dress, finish, readable
 from ident.validation.flown_case import FlownCase
@@ -63,7 +63,7 @@ def turn_figures(done: FlownCase, folder: Path, kind: str = "png") -> list[Path]
     if done.case.maneuver != "turning_circle" or flight.waves is None or turned < 4.0 * np.pi:
         return []
     figure = blank(11, 7.6)
-    margins(figure, 2, 2, bottom=0.95)
+    place_panels(figure, 2, 2, Margins(bottom=0.95))
     axes = figure.subplots(2, 2, sharex=True)
     travels = np.arctan2(*mean_direction(flight.waves)[::-1])
     for channel, axis in zip(SHOWN, np.ravel(axes), strict=True):

@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from ident.drawing import margins
+from ident.drawing import Margins, place_panels
 from ident.metrics.exceedance import Exceedance, Side, exceedances, rice_rate
 from ident.metrics.seakeeping import Harmonics, as_published
 from ident.metrics.seaway import Statistics, spectrum, uniform_step
@@ -62,7 +62,7 @@ def seaway_figure(
     ``path``.
     """
     figure = blank(11, 2.1 * len(statistics) + 1.4)
-    margins(figure, len(statistics), 1, top=0.85, gap=0.3)
+    place_panels(figure, len(statistics), 1, Margins(top=0.85, gap=0.3))
     axes = figure.subplots(len(statistics), 1, sharex=True, squeeze=False)
     for (channel, one), axis in zip(statistics.items(), axes[:, 0], strict=True):
         values, name, unit = readable(channel, simulation[channel])
@@ -122,7 +122,7 @@ def spectrum_figure(
         one_unit, name, unit = readable(channel, np.ones(1))
         panels.append((name, unit, one.spectrum, float(one_unit[0]) ** 2, "tab:red", one.rice_period))
     figure = blank(9, 1.9 * len(panels) + 1.2)
-    margins(figure, len(panels), 1, top=0.85, gap=0.4)
+    place_panels(figure, len(panels), 1, Margins(top=0.85, gap=0.4))
     axes = figure.subplots(len(panels), 1, sharex=True)
     for (name, unit, drawn, scale, colour, period), axis in zip(panels, axes, strict=True):
         axis.plot(drawn.frequency, scale * drawn.density, color=colour, lw=1.3)
@@ -181,7 +181,7 @@ def exceedance_figure(
     shown, name, unit = readable(of.channel, levels)
     rate, error = np.array([e.predicted for e in each]), np.array([e.predicted_stderr for e in each])
     figure = blank(8, 5.4)
-    margins(figure, 1, 1)
+    place_panels(figure, 1, 1)
     axis = figure.subplots()
     axis.semilogy(shown, rate, color="tab:blue", lw=1.4, label=r"Rice, from $m_0$ and $m_2$")
     factor = np.exp(2.0 * error / rate)
@@ -229,7 +229,7 @@ def harmonics_figure(
     ``path``.
     """
     figure = blank(10, 4.8)
-    margins(figure, 1, 2, bottom=0.95)
+    place_panels(figure, 1, 2, Margins(bottom=0.95))
     axes = figure.subplots(1, 2)
     depths = sorted(flown)
     for channel, axis in zip(_LABEL_OF, axes, strict=True):

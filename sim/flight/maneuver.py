@@ -330,29 +330,39 @@ class Flown(NamedTuple):
     end: Array
 
 
+class Clock(NamedTuple):
+    """Steps of a flight: their length ``dt`` [s], how many at most, and every how many of them is recorded."""
+
+    dt: float
+    steps: int
+    every: int
+
+
 def fly_logged(
     model: Model,
     settings: Settings,
     y0: Array,
     c0: Array,
-    dt: float,
-    steps: int,
-    every: int,
+    clock: Clock,
     around: Around = (),
     room: int = _EVENTS,
 ) -> Flown:
-    """``run`` with its arrays allocated, in calm, deep water or what is ``around``.
+    """``integrate`` with its arrays allocated, in calm, deep water or what is ``around``.
 
     Parameters
     ----------
+    model, settings : The boat and its commands.
+    y0, c0 : State and controls at the start.
+    clock : Steps and records.
+    around : Waves and surface.
     room : Executes and ended steps there is room for at first; with more, it is flown once more.
     """
-    record = np.zeros((steps // every + 1, CONTROLS + c0.size + COMMANDED))
+    record = np.zeros((clock.steps // clock.every + 1, CONTROLS + c0.size + COMMANDED))
     work = workspace(model, around)
     while True:
         log = Log(record, np.zeros((room, 2)), np.zeros((room, 3)))
         flight = flight_of(model, settings, work, y0.copy(), c0.copy())
-        rows, executes, ended, end = integrate(flight, work.around, log, dt, steps, every, 0.0)
+        rows, executes, ended, end = integrate(flight, work.around, log, clock.dt, clock.steps, clock.every, 0.0)
         if max(executes, ended) <= room:
             break
         room = max(executes, ended)
@@ -365,4 +375,4 @@ def fly(
     model: Model, settings: Settings, y0: Array, c0: Array, dt: float, steps: int, every: int
 ) -> tuple[Array, Array]:
     """Record and zigzag executes of ``fly_logged``."""
-    return fly_logged(model, settings, y0, c0, dt, steps, every)[:2]
+    return fly_logged(model, settings, y0, c0, Clock(dt, steps, every))[:2]

@@ -17,7 +17,7 @@ from sim.flight.case import Case
 from sim.flight.commands import compile_programme, law_code
 from sim.flight.plausible import check_lengths, check_revolutions, check_start, check_steepness
 from sim.flight.simulation import TANKS, Simulation
-from sim.flight.trim import Trim, self_propulsion
+from sim.flight.trim import Leveling, Trim, self_propulsion
 from sim.kernel.assemble import assemble, weight_across, with_tanks
 from sim.kernel.layout import Model
 from sim.waves.in_waves import Water, surroundings, water_around
@@ -80,17 +80,8 @@ def initial_state(case: Case, vehicle: Vehicle, model: Model) -> tuple[Array, Ar
     if first.state == "self_propulsion":
         mixer = mixer_of(vehicle, case.sail_planes)
         limits = plane_limits(vehicle)[0]
-        trim = self_propulsion(
-            model,
-            mixer,
-            first.speed_mps,
-            first.depth_m,
-            limits,
-            first.trim,
-            tank_limits(vehicle),
-            _held(case),
-            first.upright,
-        )
+        leveling = Leveling(first.trim, tank_limits(vehicle), _held(case), first.upright)
+        trim = self_propulsion(model, mixer, first.speed_mps, first.depth_m, limits, leveling)
         check_revolutions(case, vehicle, float(trim.controls[len(vehicle.planes)]))
         return trim.state.copy(), trim.controls.copy(), trim
     state = np.zeros(12)
@@ -195,9 +186,9 @@ def fly(case: Case, vehicle: Vehicle, model: Model, water: Water | None) -> Simu
         When the case starts from self-propulsion and there is none.
     """
     model, state, controls, trim, settings = begun(case, vehicle, model)
-    dt, (steps, every) = case.run.step_s, samples_of(case)
+    clock = maneuver.Clock(case.run.step_s, *samples_of(case))
     around = surroundings(water, model.added_mass) if water else ()
-    flown = maneuver.fly_logged(model, settings, state, controls, dt, steps, every, around)
+    flown = maneuver.fly_logged(model, settings, state, controls, clock, around)
     return Simulation(
         columns=columns_of(vehicle, model.has_tanks),
         record=flown.record,

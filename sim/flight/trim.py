@@ -141,16 +141,33 @@ def _closest(state: Array, controls: Array, mixer: Array) -> str:
     return f"closest state: planes {shown} deg, pitch {pitch:.1f} deg, n {revolutions:.3g} 1/s"
 
 
+@dataclass(frozen=True)
+class Leveling:
+    """What keeps a boat level in straight flight.
+
+    Attributes
+    ----------
+    by : ``planes``: pitch and dV are solved. ``ballast``: dV and ballast, pitch zero.
+        ``tanks``: ballast and trim tank, pitch and dV zero. A tank that would pass its limit
+        stands at it, and dV (for the trim tank) or the pitch (for ballast) is solved instead.
+    tank_limit : Largest ballast [kg] and shift of the centre of gravity [m].
+    held : Ballast and shift where they are not solved.
+    upright : No heel: the weight is shifted across the boat against the propeller's torque.
+    """
+
+    by: str = "planes"
+    tank_limit: tuple[float, float] | None = None
+    held: tuple[float, float] = (0.0, 0.0)
+    upright: bool = False
+
+
 def self_propulsion(
     model: Model,
     mixer: Array,
     speed: float,
     depth: float,
     plane_limit: Array,
-    level: str = "planes",
-    tank_limit: tuple[float, float] | None = None,
-    held: tuple[float, float] = (0.0, 0.0),
-    upright: bool = False,
+    leveling: Leveling | None = None,
 ) -> Trim:
     """Solve revolutions, heel, drift, dH and what keeps the boat level for straight flight.
 
@@ -161,24 +178,20 @@ def self_propulsion(
     speed : Speed through the water [m/s].
     depth : D0, depth of the sail top [m].
     plane_limit : (planes,) [rad].
-    level : ``planes``: pitch and dV are solved. ``ballast``: dV and ballast, pitch zero.
-        ``tanks``: ballast and trim tank, pitch and dV zero. A tank that would pass its limit
-        stands at it, and dV (for the trim tank) or the pitch (for ballast) is solved instead.
-    tank_limit : Largest ballast [kg] and shift of the centre of gravity [m].
-    held : Ballast and shift where they are not solved.
-    upright : No heel: the weight is shifted across the boat against the propeller's torque.
+    leveling : What keeps the boat level; its planes when None.
 
     Raises
     ------
     NoEquilibrium
         When the six balances have no solution or a plane is beyond its limit.
     """
-    free: tuple[str, ...] = _LEVEL[level]
-    values = {"pitch": 0.0, "dV": 0.0} | dict(zip(TANK_NAMES, held, strict=True))
-    limits = dict(zip(TANK_NAMES, tank_limit or (np.inf, np.inf), strict=True))
+    leveling = leveling or Leveling()
+    free: tuple[str, ...] = _LEVEL[leveling.by]
+    values = {"pitch": 0.0, "dV": 0.0} | dict(zip(TANK_NAMES, leveling.held, strict=True))
+    limits = dict(zip(TANK_NAMES, leveling.tank_limit or (np.inf, np.inf), strict=True))
     limited: tuple[str, ...] = ()
     while True:
-        trim, wrong = _solve(_search(model, mixer, speed, depth, free, values, upright), model)
+        trim, wrong = _solve(_search(model, mixer, speed, depth, free, values, leveling.upright), model)
         if wrong:
             raise NoEquilibrium(wrong)
         amounts = dict(zip(TANK_NAMES, trim.controls[mixer.shape[0] + 1 :], strict=model.has_tanks))

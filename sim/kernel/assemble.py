@@ -264,7 +264,7 @@ def assemble(coefficients: Coefficients, environment: Environment) -> Model:
     check_mass(total, added, vehicle)
     check_shares(((c.term, c.values) for c in coefficients), vehicle)
     still = [OUTPUTS.index(o) for o in held(vehicle.term_set)]
-    numbers = {
+    numbers: layout.Numbers = {
         "mass": particulars.mass.value,
         "weight": particulars.mass.value * environment.gravity,
         "buoyancy": particulars.displaced_mass.value * environment.gravity,
@@ -280,14 +280,17 @@ def assemble(coefficients: Coefficients, environment: Environment) -> Model:
         "ship": _ship_numbers(coefficients, environment),
     }
     planes = [[*p.position, *p.lift_axis] for p in vehicle.planes]
-    return layout.pack(
-        numbers,
-        planes=np.array(planes, dtype=float).reshape(-1, layout.PLANE_WIDTH),
+    tables = layout.Tables(
         axes=np.array(list(flat.axis.values()), dtype=np.int64).reshape(-1, 4),
         nodes=np.array(flat.nodes, dtype=float),
         groups=tuple(flat.groups),
         multipliers=np.array(list(flat.multipliers), dtype=np.int64).reshape(-1, layout.MAX_FACTORS),
         data=np.concatenate(flat.data),
+    )
+    return layout.pack(
+        numbers,
+        planes=np.array(planes, dtype=float).reshape(-1, layout.PLANE_WIDTH),
+        tables=tables,
         ship=_ship_kinds(coefficients),
         held=still,
     )

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple, TypeAlias
+from typing import Any, NamedTuple, TypeAlias, TypedDict
 
 import numpy as np
 from numpy.typing import NDArray
@@ -283,21 +283,49 @@ def _cells(nodes: Array, rule: int) -> Array:
     return table
 
 
-def pack(
-    numbers: dict[str, Any],
-    planes: Array,
-    axes: Whole,
-    nodes: Array,
-    groups: tuple[Group, ...],
-    multipliers: Whole,
-    data: Array,
-    ship: tuple[bool, int] = (False, -1),
-    held: Sequence[int] = (),
-) -> Model:
-    """A model from its parts; arguments as the attributes of ``Model``, ``numbers`` by name.
+class Numbers(TypedDict):
+    """What ``pack`` enters into a model beside its tables; each as the attribute of ``Model`` of that name."""
 
-    ``ship`` says whether there is a propeller of ``SHIP_TERMS``, and which plane is the rudder of them.
+    mass: float
+    weight: float
+    buoyancy: float
+    r_g: Sequence[float] | Array
+    r_b: Sequence[float] | Array
+    inertia: Sequence[float] | Array
+    sail_top: float
+    diameter: float
+    wake: float
+    mass_matrix: Array
+    added_mass: Array
+    inverse_mass: Array
+    ship: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Tables:
+    """The coefficients of a model over their axes; as the attributes of ``Model``."""
+
+    axes: Whole
+    nodes: Array
+    groups: tuple[Group, ...]
+    multipliers: Whole
+    data: Array
+
+
+def pack(
+    numbers: Numbers, planes: Array, tables: Tables, ship: tuple[bool, int] = (False, -1), held: Sequence[int] = ()
+) -> Model:
+    """A model from its parts.
+
+    Parameters
+    ----------
+    numbers : Mass, buoyancy and the rest.
+    planes : (planes, 6) position [m] and lift axis.
+    tables : Of coefficients.
+    ship : Whether there is a propeller of ``SHIP_TERMS``, and which plane is the rudder of them (-1: none).
+    held : Motions that are held, as places of u v w p q r.
     """
+    axes, nodes, groups, multipliers, data = tables.axes, tables.nodes, tables.groups, tables.multipliers, tables.data
     one = FEATURES + N_BOAT + N_PLANE * len(planes)
     cells = [_cells(nodes[first : first + n], rule) for _, rule, first, n in axes]
     floats = [np.zeros(PLANES), planes.ravel(), nodes, *(c.ravel() for c in cells)]

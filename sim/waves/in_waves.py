@@ -12,7 +12,7 @@ from sim.files.errors import InputError
 from sim.hull.emergence import Cells
 from sim.waves.drift import Drift, make_drift
 from sim.waves.linear import Waves, calm
-from sim.waves.loads import Sea, make_sea, section_added_mass
+from sim.waves.loads import Gauges, Sea, Summing, make_sea, section_added_mass
 from sim.waves.points import hull_cells, probes, section_masses, volume_points
 from sim.waves.surroundings import Surroundings, surroundings_of
 
@@ -73,7 +73,7 @@ def water_around(
     hull = hull_cells(vehicle, environment, centres)
     places = probes(vehicle) if waves.amplitude.size else np.zeros((0, 3))
     box = np.stack([hull.low, hull.high])
-    sea = make_sea(waves, volume, centres, masses, places, span, stations=hull.stations, box=box)
+    sea = make_sea(waves, volume, centres, masses, places, Summing(span), Gauges(hull.stations, box))
     second = waves if second_order else calm(waves.density, waves.gravity)
     drift = make_drift(coefficients, environment, second, top_speed)
     return Water(sea, hull, drift, centres, masses, environment.density * environment.gravity)

@@ -23,6 +23,7 @@ precision. ``sim.waves.passage`` makes them along a path, once in a while.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from math import exp, floor, sqrt
 from typing import NamedTuple
 
@@ -115,16 +116,45 @@ def section_added_mass(centre: Array, mass: Array) -> Array:
     return np.asarray(motion.T @ (mass[:, None] * motion))
 
 
+@dataclass(frozen=True)
+class Summing:
+    """How often wave components are summed along a boat's path.
+
+    Attributes
+    ----------
+    span : Time between sums [s]; the error of the loads falls with its fourth power.
+    reach : Largest accepted miss of a predicted point before the sum is done again [m].
+    """
+
+    span: float = 0.4
+    reach: float = 0.05
+
+
+SUMMING = Summing()
+
+
+@dataclass(frozen=True)
+class Gauges:
+    """Where the elevation of the surface is wanted.
+
+    Attributes
+    ----------
+    stations : (e,) x [m].
+    box : (2, 3) corners of a box around the boat [m].
+    """
+
+    stations: Array
+    box: Array
+
+
 def make_sea(
     waves: Waves,
     volume: Quadrature,
     centres: Array,
     masses: Array,
     probes: Array,
-    span: float = 0.4,
-    reach: float = 0.05,
-    stations: Array | None = None,
-    box: Array | None = None,
+    summing: Summing = SUMMING,
+    gauges: Gauges | None = None,
 ) -> Sea:
     """Waves and a boat in them.
 
@@ -134,23 +164,21 @@ def make_sea(
     volume : Volume points of the hull.
     centres, masses : (s, 3) section centres [m] and c m in x, y, z [kg], Table 6.
     probes : (p, 3) where the water's velocity is wanted: planes, then propeller [m].
-    span : Time between sums [s]; the error of the loads falls with its fourth power.
-    reach : Largest accepted miss of a predicted point before the sum is done again [m].
-    stations : (e,) x over which the elevation is wanted [m]; none without.
-    box : (2, 3) corners of a box around the boat [m], with stations.
+    summing : How often the components are summed.
+    gauges : Where the elevation is wanted; nowhere when None.
 
     Raises
     ------
     ValueError
         For a span that is not positive.
     """
-    if not span > 0.0:
+    if not summing.span > 0.0:
         raise ValueError("span must be positive")
     centres, masses, probes = (np.reshape(np.asarray(a, dtype=float), (-1, 3)) for a in (centres, masses, probes))
     added = np.zeros((6, 6))
     for r, m in zip(centres, masses, strict=True):
         added += section_added_mass(r, m)
-    along = np.zeros(0) if stations is None else np.asarray(stations, dtype=float)
+    along = np.asarray(gauges.stations, dtype=float) if gauges else np.zeros(0)
     over = np.column_stack([along, np.zeros((along.size, 2))])
     gauge = np.zeros((1, 3))
     k, w, a = waves.number, waves.frequency, waves.amplitude
@@ -163,10 +191,10 @@ def make_sea(
         masses,
         np.asarray(np.linalg.pinv(added, rcond=1e-12, hermitian=True), dtype=float),
         along.size,
-        np.zeros((2, 3)) if box is None else np.asarray(box, dtype=float),
+        np.asarray(gauges.box, dtype=float) if gauges else np.zeros((2, 3)),
         float(min(a.sum(), _HIGHEST * np.sqrt(0.5 * a @ a))),
-        float(span),
-        float(reach),
+        float(summing.span),
+        float(summing.reach),
     )
 
 
