@@ -13,7 +13,6 @@ from __future__ import annotations
 import argparse
 import contextlib
 import os
-import socket
 import subprocess
 import sys
 import tempfile
@@ -23,6 +22,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from database_writers import Writers
+from object_store import object_store
 from small_campaign import fitted, write
 
 from sim.boat.database import digest, read_rows, versions
@@ -53,32 +53,9 @@ def place(folder: Path, store: bool) -> Iterator[tuple[str, dict[str, str]]]:
     if not store:
         yield str(folder / "db"), {}
         return
-    import boto3
-
-    with socket.socket() as one:
-        one.bind(("127.0.0.1", 0))
-        port = one.getsockname()[1]
-    options = {
-        "AWS_ENDPOINT_URL": f"http://127.0.0.1:{port}",
-        "AWS_ALLOW_HTTP": "true",
-        "AWS_ACCESS_KEY_ID": "nobody",
-        "AWS_SECRET_ACCESS_KEY": "nothing",
-        "AWS_REGION": "us-east-1",
-    }
-    os.environ.update(options)
-    command = [sys.executable, "-m", "moto.server", "-H", "127.0.0.1", "-p", str(port)]
-    with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as server:
-        try:
-            for _ in range(600):
-                with contextlib.suppress(OSError):
-                    socket.create_connection(("127.0.0.1", port), timeout=1.0).close()
-                    break
-                time.sleep(0.1)
-            client = boto3.client("s3", endpoint_url=options["AWS_ENDPOINT_URL"], region_name="us-east-1")
-            client.create_bucket(Bucket="labs")
-            yield "s3://labs/db", options
-        finally:
-            server.terminate()
+    with object_store() as (bucket, options):
+        os.environ.update(options)
+        yield f"{bucket}/db", options
 
 
 def main() -> int:

@@ -8,9 +8,10 @@ from importlib.util import find_spec
 import numpy as np
 import pytest
 
-from ident.validation.bands import Execution, batch_of, fly_samples
+from ident.validation.bands import Execution, fly_samples
 from ident.validation.cluster import over_dask
 from ident.validation.draws import draw
+from ident.validation.samples import batch_of
 from sim.boat.coefficients import Coefficients
 from sim.boat.row_codec import correlation_matrix
 from sim.files.errors import InputError

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import os
-import socket
-import subprocess
-import sys
 import time
 
 import pytest
 from database_writers import Writers
+from object_store import object_store
 from small_campaign import fitted, write
 
 from ident.database.leftovers import unfinished, vacuum
@@ -25,36 +23,11 @@ pytest.importorskip("moto.server", reason="the extra s3 is not installed")
 @pytest.fixture(scope="module")
 def bucket():
     """URL of an empty bucket of a server on this machine; the storage engine's options are in the environment."""
-    with socket.socket() as one:
-        one.bind(("127.0.0.1", 0))
-        port = one.getsockname()[1]
-    program = [sys.executable, "-m", "moto.server", "-H", "127.0.0.1", "-p", str(port)]
-    server = subprocess.Popen(program, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-    options = {
-        "AWS_ENDPOINT_URL": f"http://127.0.0.1:{port}",
-        "AWS_ALLOW_HTTP": "true",
-        "AWS_ACCESS_KEY_ID": "nobody",
-        "AWS_SECRET_ACCESS_KEY": "nothing",
-        "AWS_REGION": "us-east-1",
-    }
-    with pytest.MonkeyPatch.context() as patch:
+    with object_store() as (url, options), pytest.MonkeyPatch.context() as patch:
         for key, value in options.items():
             patch.setenv(key, value)
         patch.delenv("AWS_S3_ALLOW_UNSAFE_RENAME", raising=False)
-        for _ in range(600):
-            try:
-                socket.create_connection(("127.0.0.1", port), timeout=1.0).close()
-                break
-            except OSError:
-                time.sleep(0.1)
-        import boto3
-
-        boto3.client("s3", endpoint_url=options["AWS_ENDPOINT_URL"], region_name="us-east-1").create_bucket(
-            Bucket="labs"
-        )
-        yield "s3://labs"
-    server.terminate()
-    server.wait()
+        yield url
 
 
 @pytest.fixture(scope="module")

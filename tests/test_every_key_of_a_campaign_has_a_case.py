@@ -6,8 +6,8 @@ fails here until a case shows what it changes. None is left out but tables whose
 
 from __future__ import annotations
 
-from test_whatever_a_campaign_declares_counts import APART, HEADER_CASES
-from test_whatever_a_source_declares_counts import SOURCE_CASES
+from cases_of_campaign_keys import APART, HEADER_CASES
+from cases_of_source_keys import SOURCE_CASES
 
 from ident.captive.campaign_file import CampaignFile
 from ident.schemas.describe import models_in

@@ -51,3 +51,16 @@ def test_no_function_has_more_than_seven_parameters_or_sixty_lines(room):
             told = function.body[0].end_lineno - function.lineno if ast.get_docstring(function) else 0
             assert function.end_lineno - function.lineno - told < 60 or is_free(function), place
     assert count or room[-1] in ("__init__.py", "options.py")
+
+
+def test_test_modules_import_no_test_module():
+    for path in sorted((ROOT / "tests").glob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+            names = [node.module or ""] if isinstance(node, ast.ImportFrom) else []
+            names += [one.name for one in node.names] if isinstance(node, ast.Import) else []
+            assert not any(name.split(".")[-1].startswith("test_") for name in names), f"{path.name}: {names}"
+
+
+def test_files_stay_about_four_hundred_lines():
+    for path in [*FILES, *sorted((ROOT / "tests").glob("*.py"))]:
+        assert len(path.read_text("utf-8").splitlines()) <= 420, path.relative_to(ROOT)

@@ -11,28 +11,21 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, field
-from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from ident.metrics.measure import measured
 from ident.metrics.metric import Values
 from ident.validation.cluster import over_dask
 from ident.validation.draws import draw, scores
-from sim.boat.coefficients import Coefficients
+from ident.validation.samples import Batch, Flown, batch_of
 from sim.boat.row_codec import correlation_matrix
 from sim.boat.vehicle import Vehicle
 from sim.files.errors import InputError
 from sim.flight.case import Case
-from sim.flight.craft import Craft
-from sim.flight.series import Series
-from sim.flight.simulate import columns_of, equipped, fly, samples_of, uses_tanks
+from sim.flight.simulate import columns_of, samples_of, uses_tanks
 from sim.flight.simulation import DERIVED
-from sim.flight.trim import NoEquilibrium
-from sim.kernel.assemble import Assembly
-from sim.waves.in_waves import Water
 
 Array = NDArray[np.float64]
 _log = logging.getLogger(__name__)
@@ -142,77 +135,6 @@ def _row_steps(rows: pd.DataFrame, estimates: pd.DataFrame) -> tuple[NDArray[np.
     value = estimates["value"].to_numpy()
     turned = np.sign(rows["value"].to_numpy() * np.where(index >= 0, value[index], 1.0)) < 0.0
     return index, np.asarray(np.where(turned, -1.0, 1.0) * rows["stderr"].to_numpy(), dtype=np.float64)
-
-
-class Flown(NamedTuple):
-    """One sample: (channels, records) by source, and the metrics of the case's own flight."""
-
-    records: dict[str, Array]
-    metrics: Values
-
-
-@dataclass(frozen=True)
-class Batch:
-    """A case to be flown with many sets of row values; goes to other processes as it is.
-
-    Attributes
-    ----------
-    flights : The case, under "", and the case from the start of a source's record, by source.
-    vehicle : Of the case.
-    assembly : Row values to the model.
-    channels : Names of what a flight gives.
-    water : Waves and surface, with the sections' added mass at its database values.
-    """
-
-    flights: dict[str, Case]
-    vehicle: Vehicle
-    assembly: Assembly
-    channels: tuple[str, ...]
-    water: Water | None
-
-    def fly(self, values: Array) -> list[Flown | None]:
-        """Fly one sample after the other.
-
-        Parameters
-        ----------
-        values : (k, rows) row values.
-
-        Returns
-        -------
-        For each sample its records and metrics; None without a self-propulsion state.
-        """
-        samples: list[Flown | None] = []
-        # A sample is measured by itself: references and published values are the case's.
-        bare = self.flights[""].model_copy(update={"reference": None, "published": []})
-        for sample in values:
-            model = self.assembly.model(sample)
-            try:
-                flown = {
-                    s: fly(c, self.vehicle, equipped(c, self.vehicle, model), self.water)
-                    for s, c in self.flights.items()
-                }
-            except NoEquilibrium:
-                samples.append(None)
-                continue
-            measures = measured(bare, flown[""], Series({}), {}).metrics
-            metrics = {name: metric.simulated for name, metric in measures.items()}
-            samples.append(Flown({s: np.stack([one[c] for c in self.channels]) for s, one in flown.items()}, metrics))
-        return samples
-
-
-def batch_of(case: Case, vehicle: Vehicle, rows: pd.DataFrame) -> Batch:
-    """The batch of a case; raises ``InputError`` when it uses tanks that the vehicle lacks."""
-    started = {s: case.started_as(s) for s in (case.reference.compare if case.reference else [])}
-    craft = Craft(Coefficients(vehicle, rows))
-    assembly = craft.assembly(case)
-    equipped(case, vehicle, assembly.model(rows["value"].to_numpy()))
-    return Batch(
-        flights={"": case} | {s: c for s, c in started.items() if c is not None},
-        vehicle=vehicle,
-        assembly=assembly,
-        channels=(*columns_of(vehicle, uses_tanks(case)), *DERIVED),
-        water=craft.water(case),
-    )
 
 
 def _check_room(case: Case, vehicle: Vehicle, rows: pd.DataFrame, samples: int) -> None:

@@ -19,7 +19,7 @@ def over_dask(address: str, batch: Any, chunks: Iterable[Array]) -> Iterator[tup
     Parameters
     ----------
     address : Of the scheduler.
-    batch : An ``ident.validation.bands.Batch``; its method ``fly`` is called with each chunk on a worker.
+    batch : An ``ident.validation.samples.Batch``; its method ``fly`` is called with each chunk on a worker.
     chunks : (k, rows) row values each, taken as workers become free.
 
     Yields
