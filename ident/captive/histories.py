@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ident.captive import delay
 from ident.captive.channels import Channels, Timed, timed
 from ident.captive.motion import frequency_of, line_of, phase_is_known
-from ident.captive.oscillation import PHASES
+from ident.captive.oscillation import PHASES, Oscillation
 from ident.captive.quantities import HARMONICS, TAKEN
 from ident.captive.source import MOTIONS, Reduction
 from ident.timeseries import blocks as condense
@@ -22,6 +23,8 @@ from ident.timeseries.faults import Usual, usual
 from ident.timeseries.frequency import Line
 from sim.boat.catalogue import OUTPUTS
 from sim.files.errors import InputError
+
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -89,7 +92,42 @@ class Reduced:
         return texts
 
 
-def reduce(channels: Channels, rule: Reduction, run_id: str, frequency: float | None) -> tuple[dict[str, Any], Reduced]:
+@dataclass(frozen=True)
+class HistoryValues:
+    """What a history comes to.
+
+    Attributes
+    ----------
+    quantities : Quantity -> mean, or of an oscillation's own rates the amplitude; ``s_X`` standard errors of loads.
+    harmonics, covariance : Load -> (7,) and (7, 7), as ``Oscillation``; of oscillatory tests.
+    frequency, amplitude : Of an oscillatory test: [Hz], and of the displacement where a channel measures it.
+    """
+
+    quantities: dict[str, float]
+    harmonics: dict[str, Array] = field(default_factory=dict)
+    covariance: dict[str, Array] = field(default_factory=dict)
+    frequency: float | None = None
+    amplitude: float | None = None
+
+    @property
+    def measured(self) -> set[str]:
+        """Names of what the history gives, as constants of a source would be called."""
+        harmonics = {f"{load}_{h}" for load in self.harmonics for h in HARMONICS}
+        return {*self.quantities, *harmonics, *(("amplitude",) if self.amplitude is not None else ())}
+
+    def oscillation(self, row: Mapping[str, Any]) -> Oscillation:
+        """The oscillatory test, with what the row of the run states beside it."""
+        stated = Oscillation.of_row(row)
+        return replace(
+            stated,
+            harmonics=stated.harmonics | self.harmonics,
+            covariance=self.covariance,
+            frequency=self.frequency,
+            amplitude=stated.amplitude if self.amplitude is None else self.amplitude,
+        )
+
+
+def reduce(channels: Channels, rule: Reduction, run_id: str, frequency: float | None) -> tuple[HistoryValues, Reduced]:
     """Reduce one history.
 
     Parameters
@@ -101,8 +139,7 @@ def reduce(channels: Channels, rule: Reduction, run_id: str, frequency: float | 
 
     Returns
     -------
-    values : Quantity -> value, ``s_X`` standard errors; for an oscillatory test the
-        harmonics of each load with their covariance under ``covariance``.
+    values : Of the run.
     reduced : What was fitted.
 
     Raises
@@ -138,12 +175,12 @@ def reduce(channels: Channels, rule: Reduction, run_id: str, frequency: float | 
         line=line,
     )
     if rule.kind == "oscillatory":
-        harmonics, delays = _harmonic_values(names, fit, frequency or 0.0, rule)
+        values, delays = _harmonic_values(names, fit, frequency or 0.0, rule)
         whole = condense.condense(_moved(sound(None), channels, names, rule, frequency), condense.constant, len(names))
         weight, time, _, samples = whole.blocks()
         seen = delay.of_loads(time, samples, weight, names, frequency or 0.0, rule.delay_s)
-        return harmonics, replace(reduced, delays=(*delays, *((seen,) if seen else ())))
-    return _means(names, fit, rule, span), reduced
+        return values, replace(reduced, delays=(*delays, *((seen,) if seen else ())))
+    return HistoryValues(_means(names, fit, rule, span)), reduced
 
 
 def _check_channels(channels: Channels, rule: Reduction) -> None:
@@ -155,9 +192,9 @@ def _check_channels(channels: Channels, rule: Reduction) -> None:
         raise InputError(str(channels.path), "no time", text)
 
 
-def _means(names: list[str], fit: reduction.Fitted, rule: Reduction, span: float) -> dict[str, Any]:
+def _means(names: list[str], fit: reduction.Fitted, rule: Reduction, span: float) -> dict[str, float]:
     """Means of a steady or accelerated run and the standard errors of its loads."""
-    values: dict[str, Any] = {}
+    values: dict[str, float] = {}
     for c, name in enumerate(names):
         values[name] = float(fit.values[0, c])
         if name in OUTPUTS:
@@ -210,16 +247,19 @@ def _regressors(
 
 def _harmonic_values(
     names: list[str], fit: reduction.Fitted, frequency: float, rule: Reduction
-) -> tuple[dict[str, Any], list[delay.Delay]]:
+) -> tuple[HistoryValues, list[delay.Delay]]:
     """Harmonics in the phase of the displacement, which a channel may measure, each channel's delay taken off."""
-    shift, values = 0.0, {}
+    shift, amplitude = 0.0, None
+    values: dict[str, float] = {}
     delay_s, motion = rule.delay_s, rule.motion or ""
     omega = 2.0 * math.pi * frequency
     if "displacement" in names:
         s, c = fit.values[1:3, names.index("displacement")]
         shift = math.atan2(c, s) + omega * delay_s.get("displacement", 0.0)
-        values["amplitude"] = math.hypot(s, c)
-    covariance, delays = {}, []
+        amplitude = math.hypot(s, c)
+    harmonics: dict[str, Array] = {}
+    covariance: dict[str, Array] = {}
+    delays: list[delay.Delay] = []
     for c_, name in enumerate(names):
         # What comes late by a delay stands a phase of omega times it behind.
         late = omega * delay_s.get(name.removeprefix(TAKEN), 0.0)
@@ -230,7 +270,7 @@ def _harmonic_values(
             turn[2 * k - 1 : 2 * k + 1, 2 * k - 1 : 2 * k + 1] = block
         turned = turn @ fit.values[:, c_]
         if name.removeprefix(TAKEN) in OUTPUTS:
-            values |= {f"{name}_{h}": float(v) for h, v in zip(HARMONICS, turned, strict=True)}
+            harmonics[name] = turned
             covariance[name] = turn @ fit.covariance[c_] @ turn.T
         elif name in MOTIONS[motion]:
             # A measured rate or acceleration swings with the motion: its amplitude is meant, not its mean.
@@ -239,4 +279,4 @@ def _harmonic_values(
             values[name] = math.hypot(turned[1], turned[2]) * (1.0 if name == MOTIONS[motion][0] else -1.0)
         elif name != "displacement":
             values[name] = float(turned[0])
-    return values | {"covariance": covariance, "frequency": frequency}, delays
+    return HistoryValues(values, harmonics, covariance, frequency, amplitude), delays

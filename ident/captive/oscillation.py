@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -20,11 +22,10 @@ Array = NDArray[np.float64]
 # The four states of an oscillation: name, phase of the displacement A sin(theta).
 PHASES = {"+v": 0.0, "-v": math.pi, "+a": math.pi / 2, "-a": 3 * math.pi / 2}
 
-
 # Amplitudes of rate and acceleration in a table are printed with three digits or more.
 _AGREE = 0.02
-
-
+# Those measured, and what was taken off them.
+_LOADS = (*OUTPUTS, *(TAKEN + o for o in OUTPUTS))
 # Test whose terms a state at the end of the velocity identifies.
 _STEADY_TEST = {"surge": "towing", "sway": "drift_horizontal", "heave": "drift_vertical"}
 
@@ -40,7 +41,36 @@ def phase_row(theta: float) -> Array:
     return row
 
 
-def states(run: dict[str, Any], rule: Reduction, frame: Frame, ittc: bool, where: str) -> list[dict[str, Any]]:
+@dataclass(frozen=True)
+class Oscillation:
+    """An oscillatory test as its harmonics.
+
+    Attributes
+    ----------
+    state : What holds for the whole run: words, and the quantities of its mean state (SI, campaign frame); the
+        amplitude of the velocity or of the acceleration (-A w^2, signed) under its name, where it is given.
+    harmonics : Load -> (7,) of ``HARMONICS``; NaN where one is not given.
+    covariance : Load -> (7, 7) of its harmonics, where it is known.
+    frequency : [Hz]. amplitude : Of the displacement [m, rad]. None where not given.
+    """
+
+    state: dict[str, Any]
+    harmonics: dict[str, Array]
+    covariance: dict[str, Array] = field(default_factory=dict)
+    frequency: float | None = None
+    amplitude: float | None = None
+
+    @classmethod
+    def of_row(cls, row: Mapping[str, Any]) -> Oscillation:
+        """From a row of a table: ``X_mean``, ``X_in``, ... beside the state, ``frequency`` and ``amplitude``."""
+        apart = ("frequency", "amplitude", "displacement")
+        state = {k: v for k, v in row.items() if k not in apart and ("_" not in k or k.split("_")[-1] not in HARMONICS)}
+        named = {o: [f"{o}_{h}" for h in HARMONICS] for o in _LOADS}
+        harmonics = {o: np.array([row.get(k, math.nan) for k in keys], dtype=float) for o, keys in named.items()}
+        return cls(state, harmonics, frequency=row.get("frequency"), amplitude=row.get("amplitude"))
+
+
+def states(run: Oscillation, rule: Reduction, frame: Frame, ittc: bool, where: str) -> list[dict[str, Any]]:
     """Four instants of an oscillatory test, each a run of its own.
 
     The displacement is A sin(theta); the velocity A w cos(theta) is largest at 0 and pi,
@@ -49,11 +79,14 @@ def states(run: dict[str, Any], rule: Reduction, frame: Frame, ittc: bool, where
 
     Parameters
     ----------
-    run : Base state (SI, campaign frame), ``X_mean``, ``X_in``, ..., ``frequency`` [Hz], and
-        one of ``amplitude`` or the acceleration's amplitude (-A w^2, signed).
+    run : The test; of amplitude, velocity and acceleration one is given, here or in the rule.
     rule : Says what oscillates.
     frame, ittc : Of the campaign: direction of the axis that moves, sign of drift.
     where : For the error.
+
+    Returns
+    -------
+    Rows of a run table.
 
     Raises
     ------
@@ -62,39 +95,37 @@ def states(run: dict[str, Any], rule: Reduction, frame: Frame, ittc: bool, where
     """
     assert rule.motion is not None
     speed_name, acceleration_name = MOTIONS[rule.motion]
-    omega = 2.0 * math.pi * float(run.get("frequency", rule.frequency_hz) or math.nan)
+    omega = 2.0 * math.pi * float((rule.frequency_hz if run.frequency is None else run.frequency) or math.nan)
     if not omega > 0.0:
         raise InputError(f"{where}, column frequency", "nothing", "a frequency, or frequency_hz in [source.reduction]")
     speed, given = _amplitudes(run, rule, omega, where)
     made = []
     for name, theta in PHASES.items():
-        state = {k: v for k, v in run.items() if "_" not in k or k.split("_")[-1] not in HARMONICS}
-        state["run_id"] = f"{run['run_id']}{name}"
+        state = dict(run.state)
+        state["run_id"] = f"{run.state['run_id']}{name}"
         at_velocity = name.endswith("v")
         _move(state, speed_name, speed * math.cos(theta) if at_velocity else 0.0, frame, ittc)
         state[acceleration_name] = 0.0 if at_velocity else given * math.sin(theta)
         usual = _STEADY_TEST.get(rule.motion, "rotating_arm")
-        state["test"] = (run.get("test") or usual) if at_velocity else "acceleration"
+        state["test"] = (run.state.get("test") or usual) if at_velocity else "acceleration"
         weights = phase_row(theta)
-        for output in (*OUTPUTS, *(TAKEN + o for o in OUTPUTS)):
-            parts = np.array([run.get(f"{output}_{h}", math.nan) for h in HARMONICS], dtype=float)
-            if np.isnan(parts).all():
+        for output in _LOADS:
+            parts = run.harmonics.get(output)
+            if parts is None or np.isnan(parts).all():
                 continue
             state[output] = float(weights @ np.nan_to_num(parts))
-            if output in OUTPUTS and output in run.get("covariance", {}):
-                variance = float(weights @ run["covariance"][output] @ weights)
+            if output in OUTPUTS and output in run.covariance:
+                variance = float(weights @ run.covariance[output] @ weights)
                 state[f"s_{output}"] = math.sqrt(max(variance, 0.0))
-        for name_ in ("covariance", "frequency", "amplitude", "displacement"):
-            state.pop(name_, None)
         made.append(state)
     return made
 
 
-def _amplitudes(run: dict[str, Any], rule: Reduction, omega: float, where: str) -> tuple[float, float]:
+def _amplitudes(run: Oscillation, rule: Reduction, omega: float, where: str) -> tuple[float, float]:
     """Amplitudes of velocity (of cosine) and acceleration (of sine), from what the run gives."""
     speed_name, acceleration_name = MOTIONS[rule.motion or "sway"]
-    amplitude = run.get("amplitude", rule.amplitude)
-    given = {k: run.get(k) for k in (speed_name, acceleration_name)}
+    amplitude = rule.amplitude if run.amplitude is None else run.amplitude
+    given = {k: run.state.get(k) for k in (speed_name, acceleration_name)}
     known = {k: float(v) for k, v in given.items() if v is not None and not math.isnan(v)}
     if acceleration_name in known:
         speed = -known[acceleration_name] / omega

@@ -20,7 +20,7 @@ from ident.captive.foam_histories import foam_channels
 from ident.captive.grids import with_discretisation
 from ident.captive.histories import Reduced, reduce
 from ident.captive.moving import axes_of, moving_body, refuse_tables
-from ident.captive.oscillation import states
+from ident.captive.oscillation import Oscillation, states
 from ident.captive.quantities import Column, owner
 from ident.captive.readers.opening import matching, on_coarser_grids, open_sheet, reader_of
 from ident.captive.readers.sheet import Sheet
@@ -268,7 +268,8 @@ def _spread(table: pd.DataFrame, source: Source, header: CampaignFile, where: st
     instants = []
     for run in table.to_dict("records"):
         place = f"{where}, row {run['row']}"
-        instants += states({str(k): v for k, v in run.items()}, source.reduction, frame, ittc, place)
+        one = Oscillation.of_row({str(k): v for k, v in run.items()})
+        instants += states(one, source.reduction, frame, ittc, place)
     return pd.DataFrame(instants)
 
 
@@ -297,15 +298,16 @@ def _from_histories(
         frequency = numbers.get("frequency", rule.frequency_hz)
         _no_idle_rule(channels, rule, where)
         values, one = reduce(channels, rule, words_of_run["run_id"], frequency)
-        for quantity in values:
-            if quantity in numbers and quantity != "frequency":
-                twice = f"{quantity} is measured and stands in [source.constants]"
-                raise InputError(str(channels.path), twice, "one of the two")
-        run = (
-            dict.fromkeys((*TEXT, "notes"), "") | {"source": f"{path.name}, reduced"} | words_of_run | numbers | values
-        )
+        for quantity in sorted(values.measured & numbers.keys()):
+            twice = f"{quantity} is measured and stands in [source.constants]"
+            raise InputError(str(channels.path), twice, "one of the two")
+        run: dict[str, Any] = dict.fromkeys((*TEXT, "notes"), "") | {"source": f"{path.name}, reduced"}
+        run |= words_of_run | numbers | values.quantities
         run |= {"file": path.name, "row": 1, "reduction": one.words(), "converged": one.fit.converged}
-        rows += states(run, rule, frame, ittc, str(path)) if rule.kind == "oscillatory" else [run]
+        if rule.kind == "oscillatory":
+            rows += states(values.oscillation(run), rule, frame, ittc, str(path))
+        else:
+            rows.append(run)
         reduced.append(one)
     out = pd.DataFrame(rows)
     for name in REQUIRED:

@@ -10,12 +10,13 @@ from typing import Annotated, Literal
 
 from pydantic import Field, field_validator, model_validator
 
+from sim.files.constants import constant
 from sim.files.errors import InputError
 from sim.files.schema import Data, FrameData, checked
 from sim.files.toml_files import read_toml
 
 # Metres in the unit that a surface is written in.
-UNITS = {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "in": 0.0254, "ft": 0.3048}
+UNITS = {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "in": constant("inch"), "ft": constant("foot")}
 Version = Literal["v1912", "v2006", "v2012", "v2106", "v2112", "v2206", "v2212", "v2306", "v2312", "v2406", "v2412"]
 Positive = Annotated[float, Field(gt=0, le=1e9)]
 Share = Annotated[float, Field(gt=0, lt=1)]

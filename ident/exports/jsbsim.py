@@ -39,14 +39,16 @@ from ident.validation.boats import Boat
 from sim.boat.catalogue import OUTPUTS, PLANE_FEATURES, STATES
 from sim.boat.coefficients import Coefficient
 from sim.boat.mass import Environment, cross_matrix
+from sim.files.constants import constant
 from sim.files.errors import InputError
 from sim.flight.case import Case
 from sim.flight.simulate import begun, environment_of
 from sim.kernel.layout import Model
 
 Array = NDArray[np.float64]
-_FOOT = 0.3048
-_NEWTON = 1.0 / 4.4482216152605
+# JSBSim counts in feet and pounds.
+_FOOT = constant("foot")
+_NEWTON = 1.0 / constant("pound_force")
 _MOTIONS = ("u", "v", "w", "p", "q", "r")
 LOST = (
     "actuators: deflections and revolutions are where their properties are set, without rates, limits or the mixer",

@@ -16,9 +16,10 @@ import shutil
 import subprocess
 import sys
 import tempfile
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
 from importlib.resources import files
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -84,8 +85,45 @@ def repeated_campaign(folder: Path, out: Path, times: int, noise: float = 0.01, 
     return out
 
 
-def fitted(folder: Path, scratch: Path) -> dict[str, Any]:
-    """Fit a campaign in a process of its own: runs, seconds, processor_s and memory_GB at its peak.
+@dataclass(frozen=True)
+class FitCost:
+    """What a fit of a campaign costs.
+
+    Attributes
+    ----------
+    runs : Rows of its run table.
+    seconds, processor_s : By the clock, and of all processors.
+    memory_GB : At its peak.
+    """
+
+    runs: int
+    seconds: float
+    processor_s: float
+    memory_GB: float
+
+
+@dataclass(frozen=True)
+class Growth:
+    """What ten times the runs cost.
+
+    Attributes
+    ----------
+    fits : Of the smaller and of the larger campaign.
+    time_ratio, memory_ratio : Of the larger over the smaller, of the processor and at the peak.
+    """
+
+    fits: tuple[FitCost, FitCost]
+    time_ratio: float
+    memory_ratio: float
+
+    @property
+    def ratios(self) -> dict[str, float]:
+        """By the names of ``data/fit_ratios.csv``."""
+        return {"time_ratio": self.time_ratio, "memory_ratio": self.memory_ratio}
+
+
+def fitted(folder: Path, scratch: Path) -> FitCost:
+    """Fit a campaign in a process of its own.
 
     Parameters
     ----------
@@ -96,23 +134,17 @@ def fitted(folder: Path, scratch: Path) -> dict[str, Any]:
     shutil.rmtree(db, ignore_errors=True)
     command = [sys.executable, "-c", _FIT, str(folder), str(db)]
     process = subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True)
-    return dict(json.loads(process.stdout.splitlines()[-1]))
+    return FitCost(**json.loads(process.stdout.splitlines()[-1]))
 
 
-def measure(folder: Path) -> dict[str, Any]:
-    """Fits of a campaign's runs repeated, and what ten times the runs cost.
-
-    Returns
-    -------
-    ``fits``, one entry a campaign as of ``fitted``, and ``time_ratio`` and ``memory_ratio`` of
-    the larger over the smaller.
-    """
+def measure(folder: Path) -> Growth:
+    """Fits of a campaign's runs repeated, and what ten times the runs cost."""
     with tempfile.TemporaryDirectory() as name:
         scratch = Path(name)
         made = [repeated_campaign(folder, scratch / f"x{times}", times) for times in _TIMES]
         small, large = (fitted(one, scratch) for one in made)
-    ratios = {"time_ratio": "processor_s", "memory_ratio": "memory_GB"}
-    return {"fits": [small, large]} | {k: round(large[v] / small[v], 3) for k, v in ratios.items()}
+    time, memory = large.processor_s / small.processor_s, large.memory_GB / small.memory_GB
+    return Growth((small, large), round(time, 3), round(memory, 3))
 
 
 def recorded() -> dict[str, float]:
@@ -121,7 +153,7 @@ def recorded() -> dict[str, float]:
         return {row["name"]: float(row["ratio"]) for row in csv.DictReader(stream)}
 
 
-def worse(measured: dict[str, Any]) -> list[str]:
+def worse(measured: Mapping[str, float]) -> list[str]:
     """What is to be said of ratios that are worse than the recorded ones by more than a quarter."""
     limits = {name: (1.0 + _TOLERANCE) * ratio for name, ratio in recorded().items()}
     return [f"{k} {measured[k]:.3g}, at most {most:.3g}" for k, most in limits.items() if measured[k] > most]
@@ -136,14 +168,15 @@ def main() -> None:
     options = parser.parse_args()
     costs = measure(options.campaign)
     if options.json == "-":
-        print(json.dumps(costs, indent=2))
+        print(json.dumps(asdict(costs), indent=2))
     else:
-        for one in costs["fits"]:
-            print("{runs:7d} runs {seconds:7.1f} s, {processor_s:.1f} s of processor, {memory_GB:.2f} GB".format(**one))
-        print(f"ten times the runs: {costs['time_ratio']:.2f} the time, {costs['memory_ratio']:.2f} the memory")
+        for one in costs.fits:
+            used = f"{one.processor_s:.1f} s of processor, {one.memory_GB:.2f} GB"
+            print(f"{one.runs:7d} runs {one.seconds:7.1f} s, {used}")
+        print(f"ten times the runs: {costs.time_ratio:.2f} the time, {costs.memory_ratio:.2f} the memory")
         if options.json:
-            Path(options.json).write_text(json.dumps(costs, indent=2) + "\n", encoding="utf-8")
-    if options.check and (said := worse(costs)):
+            Path(options.json).write_text(json.dumps(asdict(costs), indent=2) + "\n", encoding="utf-8")
+    if options.check and (said := worse(costs.ratios)):
         sys.exit("the fit grows faster with the runs than recorded: " + "; ".join(said))
 
 

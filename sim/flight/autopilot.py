@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from sim.boat.state import PSI, THETA, R, U, Y, Z
 from sim.compiled import inner, outer
 from sim.flight.orders import (
     AT_MODES,
@@ -107,20 +108,20 @@ def command_boat(
             gains, integral = GAINS + 6 * axis, PLANE_INTEGRALS + 2 * axis
             if law == YAW_RATE:
                 gains, integral = YAW_RATE_GAINS, YAW_RATE_INTEGRALS
-                errors, rates = (turn - y[5], 0.0), (-dy[5], 0.0)
+                errors, rates = (turn - y[R], 0.0), (-dy[R], 0.0)
             elif axis == VERTICAL:
-                errors = (y[8] - (g[TARGET] + far), (g[TARGET + 1] + turn) - y[10])
-                rates = (dy[8], -dy[10])
+                errors = (y[Z] - (g[TARGET] + far), (g[TARGET + 1] + turn) - y[THETA])
+                rates = (dy[Z], -dy[THETA])
             else:
-                errors = ((g[TARGET + 2] + far) - y[7], (g[TARGET + 3] + turn) - y[11])
-                rates = (-dy[7], -dy[11])
+                errors = ((g[TARGET + 2] + far) - y[Y], (g[TARGET + 3] + turn) - y[PSI])
+                rates = (-dy[Y], -dy[PSI])
             f[COMMAND + axis] = _pid(g, gains, trim, limit, errors, rates, f, integral, dt)
     _command_revolutions(g, q, f, j, y, dy, dt)
     for tank in range(2):
         start = g[TANK_START + tank]
         f[COMMAND + 3 + tank] = start
         if q[TANK_LAW + tank] == PID:
-            errors, rates = (g[TARGET] - y[8], y[10] - g[TARGET + 1]), (-dy[8], dy[10])
+            errors, rates = (g[TARGET] - y[Z], y[THETA] - g[TARGET + 1]), (-dy[Z], dy[THETA])
             integral = TANK_INTEGRALS + 2 * tank
             f[COMMAND + 3 + tank] = _pid(
                 g, TANK_GAINS + 6 * tank, start, g[TANK_LIMIT + tank], errors, rates, f, integral, dt
@@ -137,10 +138,10 @@ def _command_revolutions(
         k = q[FIRST_STEP + REVOLUTIONS] + j[REVOLUTIONS]
         law, n = q[q[AT_MODES] + k], clip(g[q[AT_STEPS] + STEP * k], low, high)
     if law == PID:
-        error = g[SPEED_TARGET] - y[0]
+        error = g[SPEED_TARGET] - y[U]
         trial = f[SPEED_INTEGRAL] + error * dt
         wanted = g[REVOLUTIONS_START] + g[SPEED_GAINS] * error + g[SPEED_GAINS + 1] * trial
-        wanted -= g[SPEED_GAINS + 2] * dy[0]
+        wanted -= g[SPEED_GAINS + 2] * dy[U]
         n = clip(wanted, low, high)
         if (wanted - n) * error <= 0.0:
             f[SPEED_INTEGRAL] = trial

@@ -12,8 +12,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from sim.boat.state import PHI, THETA, Z
 from sim.compiled import inner, outer
-from sim.kernel.layout import DIAMETER, HAS_TANKS, HELD, N_PLANES, PHI, SHIFT, THETA, Array, Whole, Z
+from sim.kernel.layout import DIAMETER, HAS_TANKS, HELD, N_PLANES, SHIFT, Array, Whole
 from sim.kernel.rhs import fill_rate
 
 # Unknowns, and what keeps the boat level.

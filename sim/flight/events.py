@@ -11,6 +11,7 @@ from math import cos, sin, sqrt
 
 import numpy as np
 
+from sim.boat.state import N_STATES
 from sim.compiled import inner
 from sim.flight.orders import (
     ABOVE,
@@ -21,7 +22,6 @@ from sim.flight.orders import (
     EVENT,
     FIRST_STEP,
     N_AXES,
-    N_STATES,
     N_STEPS,
     QUIET,
     SINCE,

@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.boat.state import N_STATES, PSI, THETA
 from sim.compiled import inlined, inner, outer
 from sim.flight.autopilot import clip, command_boat, move_actuators
 from sim.flight.events import advance, step_past, watch
@@ -39,7 +40,7 @@ from sim.flight.orders import (
     flat,
     progress,
 )
-from sim.kernel.layout import N_STATES, Around, Model, Stage, Whole, Work, workspace
+from sim.kernel.layout import Around, Model, Stage, Whole, Work, workspace
 from sim.kernel.rhs import fill_rate, step
 from sim.waves.surroundings import near_of, prepare, read_gauge
 
@@ -108,9 +109,9 @@ def flight_of(model: Model, settings: Settings, work: Work, y: Array, c: Array) 
 def _past_check(g: np.ndarray, q: np.ndarray, y: np.ndarray, sense: float) -> float:
     """Positive once the checked angle has passed the check value of the present leg."""
     if q[LAW + HORIZONTAL] == ZIGZAG:
-        return sense * np.sign(g[VALUE + HORIZONTAL]) * y[11] - g[CHECK + HORIZONTAL]
+        return sense * np.sign(g[VALUE + HORIZONTAL]) * y[PSI] - g[CHECK + HORIZONTAL]
     if q[LAW + VERTICAL] == ZIGZAG:
-        return sense * np.sign(g[VALUE + VERTICAL]) * y[10] - g[CHECK + VERTICAL]
+        return sense * np.sign(g[VALUE + VERTICAL]) * y[THETA] - g[CHECK + VERTICAL]
     return -1.0
 
 

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from sim.boat.coefficients import Coefficients
 from sim.boat.database import read_rows
+from sim.boat.state import Z
 from sim.boat.vehicle import load_vehicle
 from sim.files.errors import InputError
 from sim.flight import maneuver, orders
@@ -188,7 +189,7 @@ class Plant:
         """
         values = dict(zip(self._columns, (*self.state, *self.controls), strict=True))
         values |= {"t": self.time, "U": float(np.linalg.norm(self.state[:3]))}
-        values["D0"] = float(self.state[8]) + self._model.sail_top
+        values["D0"] = float(self.state[Z]) + self._model.sail_top
         if channel not in values:
             raise KeyError(f"{channel}; there are {', '.join(values)}")
         return float(values[channel])

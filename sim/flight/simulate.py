@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from sim.boat.catalogue import STATES
 from sim.boat.coefficients import Coefficients
 from sim.boat.mass import Environment
+from sim.boat.state import PHI, PSI, THETA, U, Y, Z
 from sim.boat.vehicle import Vehicle
 from sim.files.errors import InputError
 from sim.flight import maneuver, orders
@@ -85,8 +86,8 @@ def initial_state(case: Case, vehicle: Vehicle, model: Model) -> tuple[Array, Ar
         check_revolutions(case, vehicle, float(trim.controls[len(vehicle.planes)]))
         return trim.state.copy(), trim.controls.copy(), trim
     state = np.zeros(12)
-    state[0], state[8] = first.speed_mps, first.depth_m - model.sail_top
-    state[9], state[10] = math.radians(first.heel_deg), math.radians(first.pitch_deg)
+    state[U], state[Z] = first.speed_mps, first.depth_m - model.sail_top
+    state[PHI], state[THETA] = math.radians(first.heel_deg), math.radians(first.pitch_deg)
     tanks = _held(case) if model.has_tanks else ()
     return state, np.array([*np.zeros(len(vehicle.planes)), first.revolutions_rps or 0.0, *tanks]), None
 
@@ -127,10 +128,10 @@ def settings_of(case: Case, vehicle: Vehicle, state: Array, controls: Array, tri
         trim=np.array(commands),
         gains=np.array([dv.gains("z", "theta"), dh.gains("y", "psi")]),
         yaw_rate_gains=np.array([dh.P_r, dh.I_r, dh.D_r, 0.0, 0.0, 0.0]),
-        target=np.array([state[8], state[10], state[7], state[11]]),
+        target=np.array([state[Z], state[THETA], state[Y], state[PSI]]),
         pressure_depth=dv.depth_from == "pressure",
         speed_law=law_code(n.law),
-        speed_target=float(state[0]),
+        speed_target=float(state[U]),
         speed_gains=np.array([n.P_u, n.I_u, n.D_u]),
         revolutions=revolutions,
         mixer=mixer_of(vehicle, case.sail_planes),

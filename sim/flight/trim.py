@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.boat.state import PSI, THETA, X, Y
 from sim.flight.balance import DV, SCRATCH, Search, balance, hold, place
 from sim.kernel.layout import Model, workspace
 from sim.kernel.rhs import fill_rate
@@ -126,7 +127,7 @@ def _solve(search: Search, model: Model) -> tuple[Trim, str]:
         wrong = f"no self-propulsion state at {place_of}; {_closest(state, controls, search.mixer)}"
     # The path is straight: heading such that the course is along earth x.
     # Along north through the water, whatever carries it.
-    state[11] = -np.arctan2(derivative[7] - model.current[1], derivative[6] - model.current[0])
+    state[PSI] = -np.arctan2(derivative[Y] - model.current[1], derivative[X] - model.current[0])
     lateral = float(x[3]) if search.upright else 0.0
     return Trim(state, controls, float(search.level[DV]), float(x[5]), left, lateral=lateral), wrong
 
@@ -134,7 +135,7 @@ def _solve(search: Search, model: Model) -> tuple[Trim, str]:
 def _closest(state: Array, controls: Array, mixer: Array) -> str:
     """What a search that failed came to, where that is a state of a boat at all."""
     angles = np.degrees(controls[: mixer.shape[0]])
-    pitch, revolutions = float(np.degrees(state[10])), float(controls[mixer.shape[0]])
+    pitch, revolutions = float(np.degrees(state[THETA])), float(controls[mixer.shape[0]])
     if not np.isfinite([*angles, pitch, revolutions]).all() or max(np.abs(angles).max(initial=0.0), abs(pitch)) > 90.0:
         return "the search leaves all upright attitudes: planes, thrust and weight do not balance there"
     shown = ", ".join(f"{a:.1f}" for a in angles)

@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.boat.state import PHI, THETA, Z
 from sim.compiled import inner, outer
 from sim.hull.mesh import Mesh
 
@@ -178,12 +179,12 @@ def lose(
         a[out + i] = 0.0
     for i in range(sections):
         a[dry + i] = 0.0
-    st, ct = sin(y[10]), cos(y[10])
-    down0, down1, down2 = -st, sin(y[9]) * ct, cos(y[9]) * ct
+    st, ct = sin(y[THETA]), cos(y[THETA])
+    down0, down1, down2 = -st, sin(y[PHI]) * ct, cos(y[PHI]) * ct
     total, mx, my, mz = 0.0, 0.0, 0.0, 0.0
     for i in range(count):
         k = at + CELL * i
-        depth = y[8] + down0 * a[k] + down1 * a[k + 1] + down2 * a[k + 2] + a[surface + b[places + 2 * i]]
+        depth = y[Z] + down0 * a[k] + down1 * a[k + 1] + down2 * a[k + 2] + a[surface + b[places + 2 * i]]
         half = abs(down0) * a[k + 3] + abs(down1) * a[k + 4] + abs(down2) * a[k + 5]
         if depth < half:
             share = a[k + 6] * min(1.0, 0.5 * (half - depth) / half)

@@ -10,6 +10,7 @@ from math import cos, sin
 
 import numpy as np
 
+from sim.boat.state import PHI, THETA
 from sim.compiled import inlined, inner
 from sim.kernel.layout import (
     HAS_TANKS,
@@ -38,8 +39,8 @@ def add_tank_loads(m: np.ndarray, w: np.ndarray, y: np.ndarray, c: np.ndarray, s
     dm, shift = c[w[N_PLANES] + 1], c[w[N_PLANES] + 2]
     u, v, w_, p, q, r = y[0], y[1], y[2], y[3], y[4], y[5]
     g = m[WEIGHT] / m[MASS]
-    st, ct = sin(y[10]), cos(y[10])
-    gx, gy, gz = -st * g, ct * sin(y[9]) * g, ct * cos(y[9]) * g
+    st, ct = sin(y[THETA]), cos(y[THETA])
+    gx, gy, gz = -st * g, ct * sin(y[PHI]) * g, ct * cos(y[PHI]) * g
     x, yy, z = m[TANK], m[TANK + 1], m[TANK + 2]
     sx, sy, sz = m[MASS] * shift + dm * x, dm * yy, dm * z
     # g - omega x v, and omega x (omega x S)

@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.boat.catalogue import BOAT_FEATURES, PLANE_FEATURES
+from sim.boat.state import N_STATES
 
 Array = NDArray[np.float64]
 Whole = NDArray[np.int64]
@@ -28,8 +29,6 @@ Whole = NDArray[np.int64]
 Around: TypeAlias = Any
 
 # Places in a state.
-U, V, W, P, Q, R, X, Y, Z, PHI, THETA, PSI = range(12)
-N_STATES = 12
 
 # Rules beyond the nodes of an axis.
 HOLD, LINEAR, LINEAR_LOAD = 0, 1, 2

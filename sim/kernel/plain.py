@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from sim.boat.catalogue import BOAT_FEATURES
 from sim.boat.forces import boat_features, slipstream
 from sim.boat.mass import cross_matrix
+from sim.boat.state import Z
 from sim.kernel import layout
 from sim.kernel.layout import Model
 
@@ -39,7 +40,7 @@ def features(m: Model, y: Array, c: Array) -> Array:
     advance = (1.0 - m.wake) * y[0] / (n * m.diameter) if n else 0.0
     of = _ship(m)
     slip = slipstream(float(y[0]), n, of["J_0 D"], of["C_T1"])
-    boat = boat_features(list(y[:3]), list(y[3:6]), y[8] + m.sail_top, n, advance, slip)
+    boat = boat_features(list(y[:3]), list(y[3:6]), y[Z] + m.sail_top, n, advance, slip)
     through = y[:3] + np.cross(y[3:6], m.planes[:, :3])
     speed = np.linalg.norm(through, axis=1)
     sine = -np.einsum("ij,ij->i", through, m.planes[:, 3:]) / np.where(speed > 0.0, speed, 1.0)

@@ -15,6 +15,7 @@ from math import asin, atan2, cos, sin, sqrt
 import numpy as np
 
 from sim.boat.catalogue import BOAT_FEATURES, STILL
+from sim.boat.state import N_STATES, PHI, PSI, THETA, X, Y, Z
 from sim.compiled import inlined, outer
 from sim.kernel.inertia import accelerate, add_tank_loads
 from sim.kernel.layout import (
@@ -31,7 +32,6 @@ from sim.kernel.layout import (
     N_LAYERS,
     N_PLANE,
     N_PLANES,
-    N_STATES,
     OUTSIDE,
     PLANE_WIDTH,
     PLANES,
@@ -45,7 +45,6 @@ from sim.kernel.layout import (
     Model,
     Stage,
     Work,
-    Z,
 )
 from sim.kernel.ship import LOADING, add_ship_loads, fill_slipstream
 from sim.kernel.tables import add_up_loads
@@ -161,7 +160,7 @@ def _rate(
         add_tank_loads(m, w, y, c, s)
     add_loads(near, y, s)
     u, v, w_, p, q, r = y[0], y[1], y[2], y[3], y[4], y[5]
-    phi, theta, psi = y[9], y[10], y[11]
+    phi, theta, psi = y[PHI], y[THETA], y[PSI]
     sf, cf, st, ct, sp, cp = sin(phi), cos(phi), sin(theta), cos(theta), sin(psi), cos(psi)
     gx, gy, gz = -st, ct * sf, ct * cf
     mass, weight = m[MASS], m[WEIGHT]
@@ -183,12 +182,12 @@ def _rate(
     f4 = s[LOADS + 4] + mz * gx - mx * gz - (r * hx - p * hz) - mass * (zg * cx - xg * cz)
     f5 = s[LOADS + 5] + mx * gy - my * gx - (p * hy - q * hx) - mass * (xg * cy - yg * cx)
     accelerate(m, w, c, (f0, f1, f2, f3, f4, f5), near, s, dy)
-    dy[6] = ct * cp * u + (sf * st * cp - cf * sp) * v + (cf * st * cp + sf * sp) * w_ + m[CURRENT]
-    dy[7] = ct * sp * u + (sf * st * sp + cf * cp) * v + (cf * st * sp - sf * cp) * w_ + m[CURRENT + 1]
-    dy[8] = -st * u + sf * ct * v + cf * ct * w_
-    dy[9] = p + (sf * q + cf * r) * st / ct
-    dy[10] = cf * q - sf * r
-    dy[11] = (sf * q + cf * r) / ct
+    dy[X] = ct * cp * u + (sf * st * cp - cf * sp) * v + (cf * st * cp + sf * sp) * w_ + m[CURRENT]
+    dy[Y] = ct * sp * u + (sf * st * sp + cf * cp) * v + (cf * st * sp - sf * cp) * w_ + m[CURRENT + 1]
+    dy[Z] = -st * u + sf * ct * v + cf * ct * w_
+    dy[PHI] = p + (sf * q + cf * r) * st / ct
+    dy[THETA] = cf * q - sf * r
+    dy[PSI] = (sf * q + cf * r) / ct
 
 
 @outer

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.boat.state import PHI, PSI, THETA, Z
 from sim.compiled import inner, outer
 from sim.waves.linear import Waves
 
@@ -152,11 +153,11 @@ def mean_load(
     ----------
     speeds, headings, depths : Of the table. decay, least, speed_step : As ``Drift``.
     """
-    depth = max(y[8], least)
+    depth = max(y[Z], least)
     size, near = exp(-decay * depth), least / depth * (depths - 1)
     d = min(int(near), depths - 2)
     near -= d
-    turn = y[11] / TWO_PI
+    turn = y[PSI] / TWO_PI
     turn = (turn - floor(turn)) * headings
     h = min(int(turn), headings - 1)
     turn -= h
@@ -175,7 +176,7 @@ def mean_load(
         k += share * a[i + 3]
         m += share * a[i + 4]
         n += share * a[i + 5]
-    st, ct, sf, cf = sin(y[10]), cos(y[10]), sin(y[9]), cos(y[9])
+    st, ct, sf, cf = sin(y[THETA]), cos(y[THETA]), sin(y[PHI]), cos(y[PHI])
     return (
         ct * x - st * z,
         sf * (st * x + ct * z) + cf * yy,

@@ -30,6 +30,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.boat.state import PHI, PSI, THETA, X, Y, Z
 from sim.compiled import inlined, outer
 from sim.waves.linear import Waves
 from sim.waves.pressure import Quadrature, box_top, fill_rotation
@@ -225,7 +226,7 @@ def passage(sea: Sea) -> Passage:
 def _place(sea: Sea, y: Array, time: float, pas: Passage) -> None:
     """Points and their velocities from the shallowest one, in earth axes; phases and sizes there."""
     m, w = pas.matrix, sea.waves
-    fill_rotation(y[9], y[10], y[11], m)
+    fill_rotation(y[PHI], y[THETA], y[PSI], m)
     top, gauge = np.inf, sea.points.shape[0] - sea.stations - 1
     for i in range(sea.points.shape[0]):
         a, b, c = sea.points[i, 0], sea.points[i, 1], sea.points[i, 2]
@@ -236,7 +237,7 @@ def _place(sea: Sea, y: Array, time: float, pas: Passage) -> None:
             pas.place[i, k] = m[k, 0] * a + m[k, 1] * b + m[k, 2] * c
             pas.motion[i, k] = m[k, 0] * u + m[k, 1] * v + m[k, 2] * d
         # Above the calm surface the waves keep the values they have there.
-        pas.place[i, 2] = max(y[8] + pas.place[i, 2], 0.0)
+        pas.place[i, 2] = max(y[Z] + pas.place[i, 2], 0.0)
         if i < gauge:
             top = min(top, pas.place[i, 2])
     for i in range(gauge):
@@ -244,7 +245,7 @@ def _place(sea: Sea, y: Array, time: float, pas: Passage) -> None:
     for i in range(gauge + 1, sea.points.shape[0]):
         pas.place[i, 2] = pas.motion[i, 2] = 0.0
     # Where the boat is in the water that carries the waves.
-    north, east = y[6] - w.flow_north * time, y[7] - w.flow_east * time
+    north, east = y[X] - w.flow_north * time, y[Y] - w.flow_east * time
     for j in range(w.amplitude.size):
         angle = w.number[j] * (w.north[j] * north + w.east[j] * east) - w.frequency[j] * time + w.phase[j]
         angle -= TWO_PI * floor(angle / TWO_PI)
@@ -286,7 +287,7 @@ def _add(points: Array, i: int, fx: float, fy: float, fz: float, out: Array, at:
 def _near(sea: Sea, y: Array, matrix: Array) -> bool:
     """Whether a crest can reach the boat before the next sums; ``matrix`` turns body to earth."""
     rise = sea.span * sqrt(y[0] * y[0] + y[1] * y[1] + y[2] * y[2])
-    return y[8] + box_top(sea.box.reshape(6), 0, matrix[2, 0], matrix[2, 1], matrix[2, 2]) - rise <= sea.crest
+    return y[Z] + box_top(sea.box.reshape(6), 0, matrix[2, 0], matrix[2, 1], matrix[2, 2]) - rise <= sea.crest
 
 
 @outer

@@ -11,6 +11,7 @@ from math import sqrt
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.boat.state import PHI, PSI, THETA
 from sim.compiled import inlined, inner, outer
 from sim.waves.loads import IMPULSE, WATER, Passage, Sea, evaluate
 from sim.waves.pressure import fill_rotation
@@ -29,7 +30,7 @@ def _predict(sea: Sea, y: Array, gain: Array, matrix: Array, out: Array) -> None
     for k in range(6):
         mean[k] = y[k] + 0.5 * gain[k]
         out[k] = y[k] + gain[k]
-    phi, theta, psi = y[9], y[10], y[11]
+    phi, theta, psi = y[PHI], y[THETA], y[PSI]
     for _ in range(2):
         # Rates of the angles at the start, then at half time.
         fill_rotation(phi, theta, psi, matrix)
@@ -37,12 +38,12 @@ def _predict(sea: Sea, y: Array, gain: Array, matrix: Array, out: Array) -> None
         turn = (mean[4] * matrix[2, 1] + mean[5] * matrix[2, 2]) / (ct * ct)
         dphi = mean[3] - turn * matrix[2, 0]
         dtheta = (mean[4] * matrix[2, 2] - mean[5] * matrix[2, 1]) / ct
-        phi, theta, psi = y[9] + 0.5 * h * dphi, y[10] + 0.5 * h * dtheta, y[11] + 0.5 * h * turn
+        phi, theta, psi = y[PHI] + 0.5 * h * dphi, y[THETA] + 0.5 * h * dtheta, y[PSI] + 0.5 * h * turn
     for k in range(3):
         out[6 + k] = y[6 + k] + h * (matrix[k, 0] * mean[0] + matrix[k, 1] * mean[1] + matrix[k, 2] * mean[2])
     out[6] += h * sea.waves.flow_north
     out[7] += h * sea.waves.flow_east
-    out[9], out[10], out[11] = y[9] + h * dphi, y[10] + h * dtheta, y[11] + h * turn
+    out[PHI], out[THETA], out[PSI] = y[PHI] + h * dphi, y[THETA] + h * dtheta, y[PSI] + h * turn
 
 
 @inner

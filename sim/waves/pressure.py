@@ -20,6 +20,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.boat.state import PHI, PSI, THETA, X, Y, Z
 from sim.compiled import outer
 from sim.hull.mesh import Mesh
 from sim.waves.linear import Waves, kinematics
@@ -102,7 +103,7 @@ def reference_load(mesh: Mesh, waves: Waves, y: Array, time: float) -> Array:
     -------
     (6,) X Y Z K M N about the body origin [N, N m].
     """
-    matrix = rotation(y[9], y[10], y[11])
+    matrix = rotation(y[PHI], y[THETA], y[PSI])
     return surface_load(mesh, lambda r: kinematics(waves, y[6:9] + r @ matrix.T, time).pressure)
 
 
@@ -224,12 +225,12 @@ def froude_krylov(w: Waves, q: Quadrature, y: Array, time: float, out: Array) ->
     if w.amplitude.size == 0:
         return
     m = np.empty((3, 3))
-    fill_rotation(y[9], y[10], y[11], m)
+    fill_rotation(y[PHI], y[THETA], y[PSI], m)
     for i in range(q.volumes.size):
         a, b, c = q.points[i, 0], q.points[i, 1], q.points[i, 2]
-        x = y[6] - w.flow_north * time + m[0, 0] * a + m[0, 1] * b + m[0, 2] * c
-        yy = y[7] - w.flow_east * time + m[1, 0] * a + m[1, 1] * b + m[1, 2] * c
-        z = y[8] + m[2, 0] * a + m[2, 1] * b + m[2, 2] * c
+        x = y[X] - w.flow_north * time + m[0, 0] * a + m[0, 1] * b + m[0, 2] * c
+        yy = y[Y] - w.flow_east * time + m[1, 0] * a + m[1, 1] * b + m[1, 2] * c
+        z = y[Z] + m[2, 0] * a + m[2, 1] * b + m[2, 2] * c
         north, east, down = 0.0, 0.0, 0.0
         for j in range(w.amplitude.size):
             angle = w.number[j] * (w.north[j] * x + w.east[j] * yy) - w.frequency[j] * time + w.phase[j]

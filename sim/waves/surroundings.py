@@ -21,6 +21,7 @@ import numpy as np
 from numba.extending import overload
 from numpy.typing import NDArray
 
+from sim.boat.state import PHI, THETA, Z
 from sim.compiled import inner
 from sim.hull.emergence import Cells, flat_cells, lose
 from sim.waves import passage as wave_passage
@@ -134,8 +135,8 @@ def _emerge(a: Array, b: Whole, y: Array) -> float:
         blend(a, span[0], span[1], b[AT_VALUE], b[AT_SLOPE], width, a[NOW], first, width, a, VALUES)
     for i in range(stations):
         lowest = min(lowest, a[surface + i])
-    st, ct = sin(y[10]), cos(y[10])
-    if y[8] + box_top(a, CELL_BOX, -st, ct * sin(y[9]), ct * cos(y[9])) + lowest > 0.0:
+    st, ct = sin(y[THETA]), cos(y[THETA])
+    if y[Z] + box_top(a, CELL_BOX, -st, ct * sin(y[PHI]), ct * cos(y[PHI])) + lowest > 0.0:
         for i in range(6):
             a[LOST + i] = 0.0
         return 0.0
@@ -168,7 +169,7 @@ def read_gauge(around: Around, state: Array, rate: Array) -> None:
     """
     if around.near.b[WAVES]:
         head, change = wave_passage.gauge(around.sea, around.sums, around.near.a[NOW])
-        state[8] += head
+        state[Z] += head
         rate[8] += change
 
 
@@ -219,8 +220,8 @@ def add_loads(near: Around, y: Array, out: Array) -> None:
     """Add the loads of waves and emergence, X Y Z K M N body axes [N, N m], to ``out``."""
     a, b = near.a, near.b
     share, mass = 0.0, ADDED
-    st, ct = sin(y[10]), cos(y[10])
-    if y[8] + box_top(a, BOX, -st, ct * sin(y[9]), ct * cos(y[9])) < a[CREST]:
+    st, ct = sin(y[THETA]), cos(y[THETA])
+    if y[Z] + box_top(a, BOX, -st, ct * sin(y[PHI]), ct * cos(y[PHI])) < a[CREST]:
         share = _emerge(a, b, y)
         for i in range(6):
             out[i] += a[LOST + i]
