@@ -169,7 +169,7 @@ def test_every_hull_row_has_its_port_image_with_the_declared_sign(rows, names, s
     for name in names:
         table = values_at(rows, name, "hull")
         assert table
-        assert set(term(name).parity.values()) == {sign}
+        assert set(term(name, "reduced").parity.values()) == {sign}
         for point, (value, stderr) in table.items():
             image = tuple(flip * np.array(point) + 0.0)
             assert table[image] == (sign * value, stderr), (name, point)
@@ -327,7 +327,7 @@ def test_every_load_is_used_listed_or_zero_by_symmetry(campaign, identification)
     outputs = {}
     for node in identification.nodes:
         for run in node.runs:
-            outputs.setdefault(run, set()).add(term(node.name).output)
+            outputs.setdefault(run, set()).add(term(node.name, "reduced").output)
     listed = {(one.run_id, one.output) for one in identification.unused}
     for run in campaign.runs.to_dict("records"):
         for output in (*FORCES, *MOMENTS):

@@ -148,7 +148,7 @@ def test_parity_of_plane_rows_follows_from_the_mirrored_plane():
         there = plane_features(partner, velocity * turn, -rates * turn, sense * 0.1)
         assert there["V"] == pytest.approx(here["V"], rel=1e-14)
         assert there["delta"] == pytest.approx(sense * here["delta"], rel=1e-12)
-        assert mirror_of(catalogue.term(mirror.name), mirror.part, vehicle).name == term.name
+        assert mirror_of(catalogue.term(mirror.name, vehicle.term_set), mirror.part, vehicle).name == term.name
 
 
 # -- forward and back --------------------------------------------------------------------
@@ -212,7 +212,7 @@ def test_a_coefficient_alone_forward_through_the_model_and_back_is_itself(term_s
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
 def test_a_side_of_the_heave_speed_without_runs_has_no_coefficient(side):
-    vehicle, term = load_vehicle("bb2"), catalogue.term("K_wp")
+    vehicle, term = load_vehicle("bb2"), catalogue.term("K_wp", "reduced")
     coefficient = next(iter(_single(vehicle, term, "hull", 2.0, side)))
     at = dict.fromkeys(term.axes, 1.0)
     assert coefficient.at([*(at | {"sgn(w)": side}).values()]) == 2.0
@@ -221,7 +221,7 @@ def test_a_side_of_the_heave_speed_without_runs_has_no_coefficient(side):
 
 # -- refusals ----------------------------------------------------------------------------
 
-GOOD = catalogue.term("Y_uvw")
+GOOD = catalogue.term("Y_uvw", "reduced")
 CORRUPTED = {
     "unknown factor": replace(GOOD, factors=("U", "Q")),
     "unknown axis": replace(GOOD, axes=("U", "gamma"), extrapolation={"U": "hold", "gamma": "hold"}, parity={}),
@@ -243,7 +243,7 @@ def test_unknown_set_and_unknown_term_are_refused():
     with pytest.raises(CatalogueError, match="unknown term set"):
         catalogue.terms("feldman")
     with pytest.raises(CatalogueError, match="no term"):
-        catalogue.term("Y_uuu")
+        catalogue.term("Y_uuu", "reduced")
 
 
 def test_a_vehicle_file_may_state_every_set_of_the_table_and_no_other():

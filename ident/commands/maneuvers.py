@@ -300,7 +300,7 @@ def _all(asked: ValidateOptions, console: Any) -> Scoreboard:
 
 
 @click.command()
-@click.argument("name", default="bb2")
+@click.argument("name")
 @DB
 @VERSION
 @MESSAGE

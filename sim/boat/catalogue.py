@@ -254,7 +254,7 @@ def check(term: Term) -> None:
 
 
 @cache
-def terms(term_set: str = "reduced") -> tuple[Term, ...]:
+def terms(term_set: str) -> tuple[Term, ...]:
     """The rows of one term set, in table order.
 
     Parameters
@@ -349,7 +349,7 @@ def own_terms(path: str, term_set: str, changed: int = 0) -> tuple[Term, ...]:
 
 
 @cache
-def term(name: str, term_set: str = "reduced") -> Term:
+def term(name: str, term_set: str) -> Term:
     """One row by name. Raises ``CatalogueError`` when the set has no such row."""
     for row in terms(term_set):
         if row.name == name:
