@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from copy import copy
 from pathlib import Path
 
@@ -13,7 +14,7 @@ from scipy.linalg import eigh
 from sim.boat.coefficients import Coefficients
 from sim.boat.mass import added_mass_matrix, rigid_body_matrix
 from sim.flight.simulate import mixer_of, plane_limits
-from sim.flight.trim import NoEquilibrium, self_propulsion
+from sim.flight.trim import NoEquilibrium, _closest, self_propulsion
 from sim.kernel import rhs as kernel
 from sim.kernel.assemble import assemble
 from sim.kernel.layout import workspace
@@ -182,6 +183,32 @@ def test_self_propulsion_is_an_equilibrium_on_a_straight_level_path(model, campa
     assert trim.residual < 1e-10
     # Course along earth x at the asked speed: no sway, no depth change, no turning.
     assert dy[6:12] == pytest.approx([speed, 0, 0, 0, 0, 0], abs=1e-10)
+
+
+def test_ten_degrees_of_pitch_are_out_of_reach_at_3_kts(model, campaign, stiffness):
+    """Errata, section 5.2: planes at 10 deg against the restoring moment at the check angle, twice over."""
+
+    def pitching(angle):
+        work, state = workspace(model), np.zeros(12)
+        state[0], state[8] = 3.0 * 0.514444, 30.0
+        controls = np.append(mixer_of(campaign.vehicle) @ [np.radians(angle), 0.0], 0.0)
+        kernel.rhs(model, state, controls, work, np.zeros(12))
+        return work.loads[4]
+
+    restoring = stiffness * np.sin(np.radians(10.0))
+    assert restoring == pytest.approx(3.3e6, abs=0.1e6)
+    assert 2.0 * abs(pitching(10.0) - pitching(0.0)) < 0.25 * restoring
+
+
+def test_a_search_that_left_all_attitudes_names_none():
+    """Newton's method may end at a pitch of a billion degrees; that is no closest state of a boat."""
+    state, controls, mixer = np.zeros(12), np.array([0.1, 0.1, 1.2]), np.eye(2)
+    state[10] = np.radians(4.0)
+    assert "pitch 4.0 deg" in _closest(state, controls, mixer)
+    for wrong in (np.radians(1910305350.2), np.nan):
+        state[10] = wrong
+        assert "leaves all upright attitudes" in _closest(state, controls, mixer)
+        assert not re.search(r"\d", _closest(state, controls, mixer))
 
 
 def test_no_equilibrium_is_said_when_the_planes_may_not_move(model, campaign):

@@ -161,7 +161,7 @@ def export(db: str, version: int | None, kind: str, to: Path) -> dict[str, Any]:
     return {
         "file": str(path),
         "format": kind,
-        "database": {"path": db, "version": number, "digest": commit.digest},
+        "database": commit.origin(db),
         "rows": len(rows),
         "vehicles": [
             {"vehicle": name, "version": v.number, "digest": v.digest, "rows": int(rows["vehicle"].eq(name).sum())}

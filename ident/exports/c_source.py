@@ -350,5 +350,5 @@ def export_c(boat: Boat, case: Case, db: str, folder: Path) -> dict[str, Any]:
         "name": source.name,
         "case": case.name,
         "vehicle": boat.vehicle.name,
-        "database": {"path": db, "version": boat.commit.number, "digest": boat.commit.digest},
+        "database": boat.commit.origin(db),
     }

@@ -74,7 +74,7 @@ def export_daveml(boat: Boat, db: str, path: Path) -> dict[str, Any]:
         "file": str(path),
         "format": "daveml",
         "vehicle": boat.vehicle.name,
-        "database": {"path": db, "version": boat.commit.number, "digest": boat.commit.digest},
+        "database": boat.commit.origin(db),
         "functions": len(gridded),
         "checks": checks,
         "lost": [f"{c.term.name} of {c.part}: {r}" for c in gridded for r in c.table.rules if r == "linear_load"],

@@ -19,6 +19,7 @@ from ident.output import whole
 from ident.validation.bands import fly_samples
 from ident.validation.boats import Boat, Fleet
 from ident.validation.loads import loads_by_part
+from sim.boat.delta_log import Origin
 from sim.boat.vehicle import load_vehicle
 from sim.files.errors import InputError
 from sim.flight.case import Case, load_case
@@ -72,7 +73,7 @@ class Written:
     file: str
     case: str
     vehicle: str
-    database: dict[str, Any]
+    database: Origin
     records: int
     ends_s: float
     samples: int | None = None
@@ -114,7 +115,7 @@ def fly_to_file(
     case = sampled(case, recording.every)
     vehicle = load_vehicle(vehicle_name) if vehicle_name is not None else load_vehicle(case.vehicle, beside=where)
     boat = Fleet(db, version).boat(vehicle)
-    database = {"path": db, "version": boat.commit.number, "digest": boat.commit.digest}
+    database = boat.commit.origin(db)
     path = out or Path(f"{case.name}_v{database['version']}{'.nc' if draws else '.csv'}")
     check_history_file(path)
     if draws and path.suffix != ".nc":

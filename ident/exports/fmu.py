@@ -99,7 +99,7 @@ def export_fmu(boat: Boat, case: Case, db: str, path: Path, fmi: int = 2) -> dic
         "format": f"fmi{fmi}",
         "case": case.name,
         "vehicle": boat.vehicle.name,
-        "database": {"path": db, "version": boat.commit.number, "digest": boat.commit.digest},
+        "database": boat.commit.origin(db),
         **{f"{k}s": [v.name for v in variables if v.causality == k] for k in ("input", "output", "parameter")},
     }
 

@@ -92,7 +92,7 @@ def export_gazebo(boat: Boat, case: Case, db: str, path: Path) -> dict[str, Any]
         "file": str(path),
         "format": "gazebo",
         "vehicle": vehicle.name,
-        "database": {"path": db, "version": boat.commit.number, "digest": boat.commit.digest},
+        "database": boat.commit.origin(db),
         "speed_mps": speed,
         "depth_m": depth,
         "terms": named,

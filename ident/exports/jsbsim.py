@@ -108,7 +108,7 @@ def export_jsbsim(boat: Boat, case: Case, db: str, path: Path) -> dict[str, Any]
         "file": str(path),
         "format": "jsbsim",
         "vehicle": boat.vehicle.name,
-        "database": {"path": db, "version": boat.commit.number, "digest": boat.commit.digest},
+        "database": boat.commit.origin(db),
         "functions": len(members),
         "inputs": inputs,
         "start": dict(zip(STATES, start.tolist(), strict=True)),

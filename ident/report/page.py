@@ -27,6 +27,7 @@ from ident.report.values import number as _figure
 from sim.boat.catalogue import RULES
 from sim.boat.coefficients import Coefficients
 from sim.boat.database import Version, axis_columns, own_version, read_rows
+from sim.boat.delta_log import Origin
 from sim.boat.mass import Environment
 from sim.boat.parts import vehicle_terms
 from sim.boat.vehicle import Vehicle, load_vehicle
@@ -272,7 +273,7 @@ class Written:
     file: str
     interactive: str | None
     vehicle: str
-    database: dict[str, Any]
+    database: Origin
     rows: int
     coefficients: int
     absent: list[str]

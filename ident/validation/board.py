@@ -12,6 +12,7 @@ from ident.output import html_table
 from ident.validation.coverage import used_rows
 from ident.validation.reliability import Reliability, mean_shares, ranks, reliability
 from sim.boat.database import version_words
+from sim.boat.delta_log import Origin
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -95,7 +96,7 @@ class BoardCase:
     """
 
     name: str
-    database: dict[str, Any]
+    database: Origin
     trained: bool
     parent: Parent | None = None
     errors: dict[str, dict[str, ComparedError]] | None = None
@@ -186,7 +187,7 @@ class Scoreboard:
     ['calibration', 'vehicle']
     """
 
-    database: dict[str, Any]
+    database: Origin
     cases: tuple[BoardCase, ...]
     trained_on: dict[str, list[str]]
     passed_over: dict[str, str] = field(default_factory=dict)

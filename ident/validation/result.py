@@ -11,6 +11,7 @@ import numpy as np
 from ident.output import html_table
 from ident.validation.flown_case import FlownCase
 from sim.boat.database import version_words
+from sim.boat.delta_log import Origin
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -142,9 +143,9 @@ class Validation:
         return self.boat.commit.digest
 
     @property
-    def database(self) -> dict[str, Any]:
+    def database(self) -> Origin:
         """Path, version and digest, as every JSON output names them."""
-        return {"path": self.db, "version": self.version, "digest": self.digest}
+        return self.boat.commit.origin(self.db)
 
     @property
     def flown(self) -> FlownCase:

@@ -109,7 +109,7 @@ def _one(name: str, fleet: Fleet) -> BoardCase:
         done = validated(name, fleet)
     except NoEquilibrium as error:
         case = load_case(name)[0].name
-        database = {"path": fleet.db, "version": boat.commit.number, "digest": boat.commit.digest}
+        database = boat.commit.origin(fleet.db)
         return BoardCase(case, database, is_trained(case, trained_on(boat)), failed=str(error))
     return _beside_other_versions(done, fleet, is_trained(done.case.name, trained_on(boat)))
 
@@ -161,7 +161,7 @@ def scoreboard(
         flown = tuple(pool.map(one, range(len(names)), names))
     boats = {vehicle.name: fleet.boat(vehicle) for vehicle in map(_vehicle_of, names)}
     return Scoreboard(
-        database={"path": fleet.db, "version": fleet.number, "digest": fleet.record.digest},
+        database=fleet.record.origin(fleet.db),
         cases=flown,
         trained_on={name: trained_on(boat) for name, boat in boats.items()},
         passed_over=_passed_over(cases),

@@ -14,7 +14,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
+from typing import Any, TypedDict
 from urllib.parse import unquote
 
 from sim.files.errors import InputError
@@ -47,6 +47,14 @@ WHOLE = "a database with all its files; `ident doctor --db` says what can be res
 OURS = "a database written by `ident fit`"
 
 
+class Origin(TypedDict):
+    """Where the rows of a result are from, as every JSON output names it: a database, a version and its digest."""
+
+    path: str
+    version: int
+    digest: str
+
+
 @dataclass(frozen=True)
 class Version:
     """One commit of the database.
@@ -68,6 +76,10 @@ class Version:
     def digest(self) -> str:
         """Content digest of the rows of the commit's vehicle; empty when it wrote none."""
         return self.metadata.get("digest", "")
+
+    def origin(self, path: str) -> Origin:
+        """The version as where a result is from; ``path`` is that of the database."""
+        return {"path": path, "version": self.number, "digest": self.digest}
 
     @property
     def trained(self) -> list[str]:
