@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from ident.metrics.in_waves import InWaves
     from ident.metrics.turning import SpiralPoint
     from ident.validation.bands import Bands
     from ident.validation.sweep import SweepPoint
+    from sim.boat.delta_log import Origin
     from sim.flight.case import Case
     from sim.flight.series import Series
     from sim.flight.simulation import Simulation
@@ -34,7 +35,7 @@ class FlownCase:
     grid: list[SweepPoint] | None
     in_waves: InWaves
     bands: Bands | None
-    database: dict[str, Any]
+    database: Origin
 
     @property
     def version(self) -> int:
