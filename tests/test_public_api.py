@@ -157,7 +157,7 @@ def test_versions_count_from_either_end_and_name_what_is_missing(desk, tmp_path)
             db[number]
     with pytest.raises(ident.InputError, match="no coefficient database"):
         ident.Database(tmp_path)
-    with pytest.raises(KeyError, match="N_vv; version 0 has"):
+    with pytest.raises(KeyError, match=r"no N_vv in version 0 \(my-boat\); spelt like it: N_v"):
         db[0]["N_vv"]
     with pytest.raises(ident.InputError, match="no coefficients of vehicle 'nobody'"):
         db[0].of("nobody")

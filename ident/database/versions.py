@@ -149,7 +149,8 @@ class DatabaseVersion:
     def _without(self, coefficient: str) -> str:
         near = get_close_matches(coefficient, self.coefficients, 3)
         of_whom = f"version {self.number} ({', '.join(self.vehicles)})"
-        return f"no {coefficient} in {of_whom}; there {'is' if near else 'are'} {', '.join(near or self.coefficients)}"
+        there = f"spelt like it: {', '.join(near)}" if near else f"it has {', '.join(self.coefficients)}"
+        return f"no {coefficient} in {of_whom}; {there}"
 
     def _commits(self, rows: pd.DataFrame) -> dict[str, Version]:
         names = [str(v) for v in rows["vehicle"].unique()]
