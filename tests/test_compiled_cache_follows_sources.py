@@ -14,6 +14,8 @@ from types import FunctionType, ModuleType
 import pytest
 from numba.core.dispatcher import Dispatcher
 
+import sim
+from ident.database.installation import installation
 from sim.compiled_cache import (
     PREFIX,
     VARIABLE,
@@ -234,3 +236,11 @@ def test_this_process_uses_it():
     assert place is not None
     assert place.name == PREFIX + sources_key(SIM)
     assert run_flight._cache.cache_path == str(place)
+
+
+def test_doctor_names_the_folder_that_compiled_functions_are_kept_in():
+    told = installation().cache
+    place = cache_place(Path(sim.__file__).resolve().parent)
+    assert told.folder == str(place)
+    # Tests beside this one may add to it meanwhile.
+    assert 0 <= told.bytes <= sum(p.stat().st_size for p in place.rglob("*") if p.is_file())

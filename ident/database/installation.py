@@ -10,6 +10,7 @@ from importlib import metadata
 from pathlib import Path
 
 from ident import __version__
+from sim.compiled_cache import cache_place
 
 # Packages whose version decides what is computed, written or drawn.
 _PACKAGES = (
@@ -55,7 +56,7 @@ class Installation:
 
 @dataclass(frozen=True)
 class Cache:
-    """Where compiled functions are kept: folder, empty without one, and its size in bytes."""
+    """Where compiled functions of these sources are kept: folder, empty without one, and its size in bytes."""
 
     folder: str
     bytes: int
@@ -77,17 +78,17 @@ def installation() -> Installation:
             packages[name] = metadata.version(name)
         except metadata.PackageNotFoundError:
             packages[name] = ""
-    import sim  # noqa: F401  chooses the folder
+    import sim
 
-    cache = os.environ.get("NUMBA_CACHE_DIR", "")
-    size = sum(p.stat().st_size for p in Path(cache).rglob("*") if p.is_file()) if cache else 0
+    cache = cache_place(Path(sim.__file__).resolve().parent)
+    size = sum(p.stat().st_size for p in cache.rglob("*") if p.is_file()) if cache else 0
     return Installation(
         program=f"ident {__version__}",
         python=sys.version.split()[0],
         machine=f"{platform.system()} {platform.machine()}",
         packages=packages,
         threads={"cores": os.cpu_count() or 1, **{k: os.environ[k] for k in _THREADS if k in os.environ}},
-        cache=Cache(cache, size),
+        cache=Cache(str(cache or ""), size),
         self_test=self_test(),
     )
 
