@@ -9,7 +9,7 @@ import pytest
 
 from ident.metrics.zigzag import zigzag
 from ident.timeseries.scaled_rate import smooth_with_rate
-from ident.timeseries.smoothing import Samples
+from ident.timeseries.noise import Samples
 
 ANGLE, RATE, PEAK_S = 0.05, 0.02, 30.0
 

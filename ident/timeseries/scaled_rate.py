@@ -12,7 +12,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ident.timeseries.smoothing import Samples, SmoothPath, smooth
+from ident.timeseries.noise import Samples, product
+from ident.timeseries.smoothing import SmoothPath, smooth
 
 Array = NDArray[np.float64]
 
@@ -50,7 +51,7 @@ def smooth_with_rate(angle: Samples, rate: Samples, scale_sigma: float) -> Smoot
     right, solved = zip(*(as_measured.response(part) for part in parts), strict=True)
     left = np.array(
         [
-            [_product(p, q) - float(r @ s) for q, s in zip(parts, solved, strict=True)]
+            [sum(map(product, p, q)) - float(r @ s) for q, s in zip(parts, solved, strict=True)]
             for p, r in zip(parts, right, strict=True)
         ]
     )
@@ -61,7 +62,3 @@ def smooth_with_rate(angle: Samples, rate: Samples, scale_sigma: float) -> Smoot
     factor = np.linalg.cholesky(covariance)
     away = np.array([path.response(part)[1] for part in parts[1:]])
     return replace(path, shared=tuple(factor.T @ away))
-
-
-def _product(one: tuple[Samples, ...], other: tuple[Samples, ...]) -> float:
-    return sum(float(np.sum(p.value * q.value)) / p.sigma**2 for p, q in zip(one, other, strict=True))

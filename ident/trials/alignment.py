@@ -8,8 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ident.timeseries.noise import Samples
 from ident.timeseries.scaled_rate import smooth_with_rate
-from ident.timeseries.smoothing import Samples, SmoothPath, smooth
+from ident.timeseries.smoothing import SmoothPath, smooth
 from ident.trials.body import angle_rate
 from ident.trials.consistency import path_of, regressed
 from ident.trials.maneuvers import Maneuver, control_of, holds, large
@@ -35,6 +36,8 @@ _ASIDE = math.radians(0.05)
 _LEVEL = math.radians(0.05)
 # Share of a body rate by which it may differ from the rate of the angle, along the record, heel and pitch unknown.
 _BODY_RATE = 0.005
+# Noise of fewer last digits is that of rounding.
+_DIGITS = 3.0
 _NOISE = {"psi": "heading_deg", "theta": "pitch_deg", "phi": "roll_deg", "r": "yaw_rate_degps", "north": "position_m"}
 _NOISE |= {"east": "position_m", "z": "depth_m", "U": "speed_mps", "u": "speed_mps"}
 
@@ -306,6 +309,7 @@ def paths(one: Recording, start: Start, spec: TrialFile) -> tuple[dict[str, Smoo
         samples, path = _from_run_up(record, start.time, stated_noise(spec, name))
         if path is not None:
             taken[name], smoothed[name] = samples, smooth(samples)
+            said += _alike(smoothed[name], one.headers[name])
     alone: dict[str, SmoothPath] = {n: smoothed[n] for n in ("psi", "theta", "phi") if n in smoothed}
     for name in alone:
         rate = {"psi": "r", "theta": "q", "phi": "p"}[name]
@@ -316,6 +320,16 @@ def paths(one: Recording, start: Start, spec: TrialFile) -> tuple[dict[str, Smoo
     if "psi" in smoothed and "r" not in smoothed and not {"phi", "theta"} <= set(smoothed):
         said.append("yaw rates are those of the heading: neither r nor heel and pitch are recorded or agree with it")
     return smoothed, said
+
+
+def _alike(path: SmoothPath, header: str) -> list[str]:
+    """What is said of noise that a filter has made alike from sample to sample; nothing of that of rounding."""
+    samples = path.samples[0]
+    steps, jumps = float(np.median(np.diff(samples.time))), np.abs(np.diff(samples.value))
+    digit = float(jumps[jumps > 0.0].min(initial=math.inf))
+    if (samples.memory or 0.0) < steps or path.sigma < _DIGITS * digit:
+        return []
+    return [f"{header}: its noise is alike over {samples.memory:.2g} s, as behind a filter; errors allow for it"]
 
 
 def _with_rate(
@@ -345,7 +359,7 @@ def _with_rate(
     if not inclined and rate in ("r", "q") and len(record) >= 16:
         pair = regressed(at, record.value, slopes[name])
         if pair is not None and pair.agrees:
-            smoothed[rate] = smooth([Samples(at, record.value, 0, stated_noise(spec, rate))])
+            smoothed[rate] = smooth([Samples(at, record.value, 0, stated_noise(spec, rate), None)])
     return smoothed
 
 
@@ -357,7 +371,7 @@ def _from_run_up(record: Record, execute: float, noise: float) -> tuple[list[Sam
         inside = record.kept(record.abscissa >= execute - run_up - 1e-9)
         if len(inside) < 8 or (best[0] and len(inside) == best[0][0].time.size):
             continue
-        samples = [Samples(inside.abscissa, inside.value, 0, noise)]
+        samples = [Samples(inside.abscissa, inside.value, 0, noise, None)]
         path = smooth(samples)
         if best[1] is None or best[1].sigma / 1.4 <= path.sigma <= 1.4 * best[1].sigma:
             best = (samples, path)
@@ -389,10 +403,11 @@ def _joined(
     if len(inside) < 16:
         return None
     pair = regressed(inside.abscissa, inside.value, path(inside.abscissa, 1))
-    scatter = path_of(inside).sigma
+    own = path_of(inside)
+    scatter = own.sigma
     offset_error = max(scatter, 1e-12) / math.sqrt(len(inside))
     if pair is None or abs(pair.slope - 1.0) > _CLOSE or abs(pair.offset) > 6.0 * offset_error + 1e-6:
         return None
-    first = Samples(samples[0].time, samples[0].value, 0, samples[0].sigma or path.sigma)
+    first = replace(samples[0], sigma=path.sigma, memory=path.samples[0].memory)
     sigma = math.hypot(noise or scatter, body_rate * float(np.sqrt(np.mean(inside.value**2))))
-    return smooth_with_rate(first, Samples(inside.abscissa, inside.value, 1, sigma), _CLOSE)
+    return smooth_with_rate(first, Samples(inside.abscissa, inside.value, 1, sigma, own.samples[0].memory), _CLOSE)

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from ident.captive.quantities import factor
 from ident.checks.findings import Finding
-from ident.timeseries.smoothing import Samples, SmoothPath, smooth
+from ident.timeseries.noise import Samples
+from ident.timeseries.smoothing import SmoothPath, smooth
 from ident.trials.body import body_rate
 from ident.trials.earth import drift
 from ident.trials.reading import Recording
@@ -84,7 +85,7 @@ def regressed(time: Array, value: Array, like: Array) -> Pair | None:
 
 def path_of(record: Record) -> SmoothPath:
     """The smooth path through a record."""
-    return smooth([Samples(record.abscissa, record.value, 0, 0.0)])
+    return smooth([Samples(record.abscissa, record.value, 0, 0.0, None)])
 
 
 def finding_of(

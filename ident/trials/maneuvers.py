@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ident.timeseries import MAD_TO_SIGMA
-from ident.timeseries.smoothing import Samples, SmoothPath, smooth
+from ident.timeseries.noise import Samples
+from ident.timeseries.smoothing import SmoothPath, smooth
 from ident.trials.reading import Recording
 from sim.files.errors import InputError
 from sim.files.record import Record
@@ -270,7 +271,7 @@ def reversal_angle(t: Array, path: SmoothPath, base: float) -> tuple[float, list
 def _by_angle(one: Recording, name: str) -> tuple[Maneuver, str] | None:
     """A turn or a zigzag, from heading or pitch alone."""
     record = one.channels[name]
-    path = smooth([Samples(record.abscissa, record.value, 0, 0.0)])
+    path = smooth([Samples(record.abscissa, record.value, 0, 0.0, None)])
     base = float(path(record.abscissa[0]))
     turned = path(record.abscissa) - base
     if (

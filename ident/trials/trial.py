@@ -22,7 +22,6 @@ from ident.trials.reading import Recording, read_recording
 from ident.trials.spec import TrialFile
 from ident.trials.spikes import without_spikes
 from ident.trials.stated import quoted, refuse_unused, unused
-from ident.trials.thinning import with_white_noise
 from sim.files.errors import InputError
 
 # A zigzag has its check angle at this share of the plane angle or more, and swings by less than this [deg].
@@ -172,7 +171,6 @@ def measure_trial(path: Path, spec: TrialFile | None = None, count: int = DRAWS,
     sure = _borne_out(one, maneuver, findings)
     refused(one, findings, track, sure)
     try:
-        one = with_white_noise(one)
         start = start_of(one, maneuver, spec)
         smoothed, taken = paths(one, start, spec)
         metrics = measured(one, maneuver, start, smoothed, spec, count)

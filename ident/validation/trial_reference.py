@@ -342,7 +342,8 @@ def smoothed(series: Series) -> Series:
 def _if_noisy(record: Record) -> Record | None:
     if len(record) < 30:
         return None
-    from ident.timeseries.smoothing import Samples, smooth
+    from ident.timeseries.noise import Samples
+    from ident.timeseries.smoothing import smooth
 
     path: SmoothPath = smooth([Samples(record.abscissa, record.value, 0, 0.0)])
     turns = [int(np.count_nonzero(np.diff(np.sign(np.diff(x))))) for x in (record.value, path(record.abscissa))]
