@@ -32,9 +32,10 @@ _RELATIONS = {
     "q": ("theta",),
     "u": ("north", "east", "psi"),
     "v": ("north", "east", "psi"),
+    "w": ("north", "east", "psi", "theta", "phi", "z"),
 }
 # Angles that stand between a body and those: what they are off breaks the relation too.
-_INCLINED = {"r": ("phi", "theta"), "p": ("theta", "psi"), "q": ("phi", "psi"), "u": (), "v": ()}
+_INCLINED = {"r": ("phi", "theta"), "p": ("theta", "psi"), "q": ("phi", "psi"), "u": (), "v": (), "w": ()}
 _PLAIN = ("psi", "phi", "theta", "r", "p", "q", "u", "v", "w", "north", "east", "z", "dH", "dV")
 # Correlation and slope from which a relation holds, and beyond which it is broken.
 _HOLDS, _SLOPE = 0.9, 0.15
@@ -43,6 +44,8 @@ _FEWEST, _POINTS = 16, 600
 # What moves by less than so many standard errors says nothing.
 _MOVES = 4.0
 _DEGREES = math.degrees(1.0)
+# No boat that is steered heels further; what stands under that name is another channel.
+_MOST_HEEL = math.radians(60.0)
 # A heading that has turned so far has been steered before.
 _TURNED = math.radians(2.0)
 _WORDS = {"north": "x", "east": "y"}
@@ -57,7 +60,8 @@ def swapped(one: Recording, path: Callable[[str], SmoothPath]) -> Iterator[Findi
     path : The smooth path of a channel.
     """
     names = [n for n in _PLAIN if n in one.channels and len(one.channels[n]) >= _FEWEST and _moves(one, n)]
-    if not set(_RELATIONS) & set(names):
+    too_far = _heels_too_far(one) and "phi" in names
+    if not set(_RELATIONS) & set(names) and not too_far:
         return
     paths = {n: path(n) for n in names}
     lo = max(float(p.knots[4]) for p in paths.values())
@@ -69,6 +73,9 @@ def swapped(one: Recording, path: Callable[[str], SmoothPath]) -> Iterator[Findi
     quiet = {n: float(np.median(p.deviation(t[:: _POINTS // 6], 1))) for n, p in paths.items()}
     before = _states(t, values, rates, quiet)
     broken = {k for k, state in before.items() if state is False}
+    if too_far:
+        yield from _instead_of_heel(one, t, values, rates)
+        return
     if not broken:
         return
     best: tuple[float, str, str] | None = None
@@ -89,6 +96,38 @@ def swapped(one: Recording, path: Callable[[str], SmoothPath]) -> Iterator[Findi
                 best = (size, a, b)
     if best is not None:
         yield _finding(one, best[1], best[2], ", ".join(sorted(f"{_named(one, k)}" for k in broken)))
+
+
+def _heels_too_far(one: Recording) -> bool:
+    """Whether the heel is that of no boat, beside angles that move."""
+    phi = one.channels.get("phi")
+    away = None if phi is None else np.abs(phi.value - float(np.median(phi.value[:3])))
+    return away is not None and len(away) >= _FEWEST and float(np.percentile(away, 90.0)) > _MOST_HEEL
+
+
+def _instead_of_heel(one: Recording, t: Array, values: Channels, rates: Channels) -> Iterator[Finding]:
+    """A heel that no boat has: the coordinate of the track that goes with the speed in its place, if one does."""
+    size, there = _DEGREES * float(np.max(np.abs(values["phi"]))), one.headers["phi"]
+    if not {"phi", "north", "east"} <= set(values) or not {"u", "U"} & set(values):
+        remedy = f"the unit of {there}, or what the column is: [channels] in trial.toml"
+        what = f"a heel of {size:.0f} deg, which no boat that is steered has"
+        yield finding_of(one, "impossible_heel", ("phi",), float(one.rows[0][0]), what, remedy)
+        return
+    speed = values["u" if "u" in values else "U"]
+    away: dict[str, float] = {}
+    for name in ("north", "east"):
+        other = "east" if name == "north" else "north"
+        # Degrees were read, metres stand there; the coordinate holds degrees of heel.
+        made = np.hypot(_DEGREES * rates["phi"], rates[other])
+        away[name] = float(np.sqrt(np.mean((made - speed) ** 2)))
+    now = float(np.sqrt(np.mean((np.hypot(rates["north"], rates["east"]) - speed) ** 2)))
+    name = min(away, key=lambda n: away[n])
+    if away[name] < now and float(np.ptp(values[name])) / _DEGREES < _MOST_HEEL:
+        coordinate = one.headers[name]
+        what = (
+            f"a heel of {size:.0f} deg, and the speed is that of the track when {coordinate} and {there} change places"
+        )
+        yield _pair(one, "phi", name, what)
 
 
 def steered_by_another(one: Recording) -> Iterator[Finding]:
@@ -142,7 +181,7 @@ def _known(name: str, values: Channels, rates: Channels) -> Array | None:
     """What a channel should be, by the others; None where they do not say it."""
     if any(n not in values for n in _RELATIONS[name]):
         return None
-    if name in ("u", "v"):
+    if name in ("u", "v", "w"):
         return velocities(values, rates if "z" in values else {k: v for k, v in rates.items() if k != "z"})[name]
     return body_rate(name, values, rates)
 
@@ -159,7 +198,7 @@ def _states(t: Array, values: Channels, rates: Channels, quiet: dict[str, float]
             away = float(np.sqrt(np.mean((values[name] - should) ** 2))) / max(speed, 1e-12)
             states[name] = True if away < 0.5 * _SLOPE else False if away > _SLOPE else None
             continue
-        angle = _RELATIONS[name][0]
+        angle = "z" if name == "w" else _RELATIONS[name][0]
         if float(np.std(should)) < _MOVES * quiet[angle]:
             continue
         pair = regressed(t, values[name], should)

@@ -123,11 +123,24 @@ def _taken_for_granted(
         ended = turn_ends(control)
         words = f"turning circle: until {one.headers[control.channel]} leaves its side at {ended or 0.0:.1f} s"
         return [f"{words}; --maneuver pull_out measures what follows"] if ended is not None else []
-    if maneuver.kind == "rise" and spec.surface_point_m is None:
-        return [
-            "rise: measured to the end of the record; surface_point_m ends it where that point comes to the surface"
-        ]
+    if maneuver.kind == "rise":
+        return _of_a_rise(one, spec)
     return []
+
+
+def _of_a_rise(one: Recording, spec: TrialFile) -> list[str]:
+    """Where a rise ends, and which speed its ratio is one of."""
+    said = []
+    if spec.surface_point_m is None:
+        said.append(
+            "rise: measured to the end of the record; surface_point_m ends it where that point comes to the surface"
+        )
+    if "u" not in one.channels and "U" in one.channels:
+        said.append(
+            f"rise: the speed ratio is that of {one.headers['U']}, along the path; u along the boat is not recorded, "
+            "and is less where the boat rises at an angle to its path"
+        )
+    return said
 
 
 def measure_trial(path: Path, spec: TrialFile | None = None, count: int = DRAWS, every_key: bool = True) -> Trial:

@@ -15,9 +15,12 @@ KINDS = {
     "geometry": ("parts", "origin"),
 }
 
+# Without these there is no case.
+_OF_A_CASE = ("vehicle", "environment", "run", "command")
+
 
 def kind_of(path: Path) -> str:
-    """``vehicle``, ``campaign``, ``calibration``, ``geometry``; ``case`` for everything else.
+    """``vehicle``, ``campaign``, ``calibration``, ``geometry``, ``trial``; ``case`` for everything else.
 
     Raises
     ------
@@ -25,7 +28,13 @@ def kind_of(path: Path) -> str:
         For a file that is not TOML.
     """
     data, _ = read_toml(path, "")
-    return next((kind for kind, keys in KINDS.items() if set(keys) <= set(data)), "case")
+    if (kind := next((kind for kind, keys in KINDS.items() if set(keys) <= set(data)), "")) != "":
+        return kind
+    from ident.trials.spec import TrialFile
+
+    # Every key of a trial file may be left out, and none of these.
+    told = data and set(data) <= set(TrialFile.model_fields) and not set(_OF_A_CASE) & set(data)
+    return "trial" if told else "case"
 
 
 def in_folder(folder: Path) -> tuple[list[str], dict[str, str]]:

@@ -147,6 +147,27 @@ def _passed(case: Case, by_source: dict[str, dict[str, ChannelError]]) -> bool:
     return held
 
 
+def _check_tolerances(case: Case, reference: Series) -> None:
+    """Refuse a tolerance on a channel or in a unit that the reference does not have, before anything is flown.
+
+    Raises
+    ------
+    InputError
+        Naming the tolerance, and the channels with their units that there are.
+    """
+    compare = case.reference.compare if case.reference else []
+    channels = case.reference.channels if case.reference else []
+    units = {(s, c): reference[s][c].shown[1] for s in compare for c in channels if c in reference[s]}
+    for one in case.tolerance:
+        source = TRIAL if one.source == DRIVEN else one.source
+        if units.get((source, one.channel)) != one.unit:
+            raise InputError(
+                f"case {case.name}, tolerance on {one.source} {one.channel}",
+                f"[{one.unit}]: no such reference channel in that unit",
+                ", ".join(f"{s} {c} [{u}]" for (s, c), u in units.items()) or "a reference to compare with",
+            )
+
+
 def _with_reference(case: Case, record: OwnReference) -> Referenced:
     """A case held against a user's own record, every channel that the simulation has.
 
@@ -299,6 +320,7 @@ def _held_against(
     else:
         held = referenced(flown, where)
     unknown = check_reference(held.case, held.series, where)
+    _check_tolerances(held.case, held.series)
     return held, ship, where, [*notes, *held.notes, *unknown]
 
 

@@ -41,6 +41,8 @@ def read_toml(name: str | Path, kind: str, named_in: str = "") -> tuple[dict[str
         missing, text = "no such file", "a path to a .toml file"
         if kind:
             missing, text = "no such file or bundled name", f"one of {', '.join(bundled(kind))}, or a path"
+            if str(name).endswith(".toml") and str(name)[:-5] in bundled(kind):
+                missing = f"no such file here; the bundled one is called {str(name)[:-5]}, without .toml"
         if named_in:
             raise InputError(named_in, f"{str(name)[:200]!r}: {missing}", text)
         raise InputError(str(name)[:200], missing, text)
