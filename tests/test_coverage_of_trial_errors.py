@@ -63,7 +63,7 @@ def errors(kind, rate_hz, noise, records, folder, draws=60):
 
 @pytest.mark.parametrize(
     ("kind", "rate_hz", "noise", "records"),
-    [("zigzag", 2, 0.1, 30), ("zigzag", 10, 0.5, 20), ("turn", 2, 1.0, 12), ("filtered", 10, 0.1, 20)],
+    [("zigzag", 2, 0.1, 30), ("zigzag", 10, 0.5, 20), ("turn", 2, 1.0, 12), ("filtered", 2, 0.1, 20)],
 )
 def test_intervals_cover_the_exact_flight(tmp_path, kind, rate_hz, noise, records):
     away = errors(kind, rate_hz, noise, records, tmp_path)

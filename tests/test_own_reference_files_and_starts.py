@@ -230,3 +230,20 @@ def test_a_misprinted_point_of_a_reference_is_said(tmp_path):
     assert "points of x are far from their neighbours" in said
     assert "1 of 227" in said
     assert "the first at s = 780" in said
+
+
+def test_a_tolerance_in_another_unit_is_refused_before_anything_is_flown(tmp_path):
+    """No database is there: the flight is not come to."""
+    case = tmp_path / "own.toml"
+    text = (files("sim") / "cases" / "hzz20.toml").read_text("utf-8").replace('unit = "rad"', 'unit = "deg"')
+    data = DATA / "hzz20.csv"
+    case.write_text(text.replace("data/hzz20.csv", str(data)))
+    with pytest.raises(InputError) as caught:
+        validate(case, tmp_path / "none")
+    assert "tolerance on EXP psi" in caught.value.where
+    assert "EXP psi [rad]" in caught.value.allowed
+
+
+def test_a_bundled_name_with_an_ending_is_told_without_it(fitted_db):
+    with pytest.raises(InputError, match=r"the bundled one is called remus100, without \.toml"):
+        validate("meander", fitted_db, vehicle="remus100.toml")

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from ident.metrics.zigzag import zigzag
-from ident.timeseries.scaled_rate import smooth_with_rate
 from ident.timeseries.noise import Samples
+from ident.timeseries.scaled_rate import smooth_with_rate
 
 ANGLE, RATE, PEAK_S = 0.05, 0.02, 30.0
 

@@ -69,6 +69,8 @@ def test_a_rise_ends_where_the_nose_comes_to_the_surface(flight_of, tmp_path):
     exact = np.interp(0.0, -depth[below - 1 : below + 1], flight["t"][below - 1 : below + 1])
     found = measure_trial(path, spec, 20).metrics["nose_at_surface_s"]
     assert abs(found.value - exact) < 3.5 * found.sigma < 1.0
+    path.write_text(path.read_text("utf-8").replace("u [m/s]", "speed [m/s]", 1), "utf-8")
+    assert any("speed ratio is that of speed [m/s]" in text for text in measure_trial(path, spec, 10).assumed)
 
 
 def test_pitch_counts_from_level_or_from_the_trim_by_which_the_planes_are_reversed(flight_of, tmp_path):

@@ -8,6 +8,7 @@ from click.testing import CliRunner
 from trial_records import truth, turn, write, zigzag
 
 from ident.cli import main
+from ident.trials.body import velocities
 from ident.trials.consistency import factor_between
 from ident.trials.spec import TrialFile, load_spec
 from ident.trials.trial import measure_trial
@@ -171,7 +172,7 @@ def test_slips_of_units_are_made_from_the_units_themselves():
     assert factor_between(1.3) is None
 
 
-def every_channel():
+def every_channel(submerged=False):
     """The zigzag with all channels that a recorder has, heel of its own, noise of good instruments."""
     one = zigzag()
     t, psi = one["t"], np.radians(one["psi"])
@@ -182,6 +183,15 @@ def every_channel():
     rng = np.random.default_rng(1)
     sizes = {"psi [deg]": 0.1, "r [deg/s]": 0.02, "x [m]": 0.3, "y [m]": 0.3, "phi [deg]": 0.02}
     sizes |= {"u [m/s]": 0.02, "v [m/s]": 0.02, "p [deg/s]": 0.01}
+    if submerged:
+        pitch = np.radians(1.5 * np.sin(2.0 * np.pi * t / 60.0))
+        depth = 30.0 - 5.0 * np.cumsum(np.sin(pitch)) * (t[1] - t[0])
+        angles = {"psi": psi, "phi": np.radians(heel), "theta": pitch}
+        along = velocities(angles, {"north": dx, "east": dy, "z": np.gradient(depth, t)})
+        record |= {f"{k} [m/s]": v for k, v in along.items()} | {"theta [deg]": np.degrees(pitch), "z [m]": depth}
+        record |= {"plane [deg]": 3.0 * np.sin(2.0 * np.pi * (t + 20.0) / 60.0)}
+        record["p [deg/s]"] = record["p [deg/s]"] - record["r [deg/s]"] * np.sin(pitch)
+        sizes |= {"theta [deg]": 0.02, "z [m]": 0.02, "w [m/s]": 0.01, "plane [deg]": 0.02}
     return {k: v + sizes.get(k, 0.0) * rng.standard_normal(v.size) for k, v in record.items()}
 
 
@@ -189,11 +199,12 @@ NAMED = [("psi [deg]", other) for other in ("u [m/s]", "v [m/s]", "y [m]", "phi 
 NAMED += [("r [deg/s]", other) for other in ("u [m/s]", "p [deg/s]", "delta [deg]")]
 NAMED += [("r [deg/s]", "phi [deg]"), ("r [deg/s]", "v [m/s]"), ("phi [deg]", "u [m/s]"), ("p [deg/s]", "delta [deg]")]
 NAMED += [("u [m/s]", "v [m/s]"), ("phi [deg]", "p [deg/s]"), ("v [m/s]", "delta [deg]"), ("y [m]", "delta [deg]")]
+NAMED += [("phi [deg]", "y [m]"), ("w [m/s]", "plane [deg]"), ("plane [deg]", "delta [deg]")]
 
 
 @pytest.mark.parametrize("pair", NAMED, ids=["-".join(p).replace(" ", "") for p in NAMED])
 def test_two_channels_exchanged_are_refused_by_name(tmp_path, pair):
-    record = every_channel()
+    record = every_channel(submerged="plane [deg]" in pair)
     first, second = pair
     record[first], record[second] = record[second], record[first]
     error = refusal(tmp_path, record)
@@ -216,6 +227,15 @@ def assert_truth(trial):
     for name, value in truth()["zigzag"].items():
         measured = trial.metrics[name]
         assert abs(measured.value - value) < 4.0 * measured.sigma, name
+
+
+def test_a_heel_of_no_boat_is_a_finding_where_nothing_says_whose_it_is(tmp_path):
+    record = zigzag_columns() | {"phi [deg]": zigzag()["y"]}
+    for name in ("u [m/s]", "x [m]", "y [m]"):
+        record.pop(name)
+    done = measure_trial(write(tmp_path / "one.csv", record), None, COUNT)
+    (finding,) = done.findings
+    assert (finding.check, finding.columns) == ("impossible_heel", ("phi [deg]",))
 
 
 def test_a_flight_as_ident_fly_writes_it_has_two_depths_and_one_is_used(tmp_path):

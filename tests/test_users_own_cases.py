@@ -158,6 +158,10 @@ def test_the_folder_that_a_starter_fills_is_a_folder_of_cases(tmp_path):
         "calibration.toml": "calibration",
         "my-boat.toml": "vehicle",
     }
+    # The trial file of a reference lies beside its case.
+    (folder / "zigzag_trial.toml").write_text('maneuver = "zigzag 20/20"\n[noise]\nheading_deg = 0.1\n')
+    assert in_folder(folder)[0] == cases
+    assert in_folder(folder)[1][str(folder / "zigzag_trial.toml")] == "trial"
     (folder / "slip.toml").write_text((folder / "zigzag.toml").read_text("utf-8").replace("[command", "[commnad"))
     slipped = next(name for name in in_folder(folder)[0] if name.endswith("slip.toml"))
     with pytest.raises(InputError, match="commnad"):

@@ -20,6 +20,7 @@ from trial_records import turned, write
 
 from ident.metrics import vertical
 from ident.metrics.measure import channels_of, measured
+from ident.trials.measure import DRAWS
 from ident.trials.spec import TrialFile
 from ident.trials.trial import measure_trial
 from sim.boat.coefficients import Coefficients
@@ -104,7 +105,7 @@ def approach_of(one: Flown) -> float:
     return 0.0 if float(one.flight["u"][0]) == 0.0 else APPROACH_S
 
 
-def errors(one: Flown, folder: Path, seeds: range, draws: int = 40) -> Iterator[dict[str, float]]:
+def errors(one: Flown, folder: Path, seeds: range, draws: int = DRAWS) -> Iterator[dict[str, float]]:
     """Of each record: error of each metric in its stated standard errors."""
     words, stated = MANEUVERS[one.name]
     spec = TrialFile(maneuver=words, execute_s=approach_of(one), **stated)

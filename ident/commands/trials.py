@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -10,11 +11,30 @@ import click
 from ident.commands.shared import Number, console_for, either, emit, json_to, out_file
 from ident.text import on_screen
 
+# What may follow the first word of a maneuver: its angles, and second words.
+_FOLLOWS = re.compile(r"\d+(\.\d+)?(/\d+(\.\d+)?)?|zig-?zag|circle|spiral|out|stop|decay|change|keeping", re.IGNORECASE)
 
-@click.command()
+
+class _Maneuver(click.Command):
+    """A command whose ``--maneuver zigzag 20/20`` needs no quotation marks."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        joined: list[str] = []
+        inside = False
+        for text in args:
+            follows = inside and len(joined[-1].split()) < 3 and _FOLLOWS.fullmatch(text) and not Path(text).exists()
+            if follows and joined[-1] != "--maneuver":
+                joined[-1] += f" {text}"
+                continue
+            inside = text.startswith("--maneuver") or (inside and joined[-1] == "--maneuver")
+            joined.append(text)
+        return super().parse_args(ctx, joined)
+
+
+@click.command(cls=_Maneuver)
 @click.argument("path", metavar="FILE|DIR", type=click.Path(path_type=Path))
 @click.option("--spec", type=click.Path(path_type=Path), default=None, help="trial.toml: what the record does not say.")
-@click.option("--maneuver", default="", help='As "zigzag 20/20" or "turning_circle 35", instead of the spec\'s.')
+@click.option("--maneuver", default="", help="As zigzag 20/20 or turning_circle 35, instead of the spec's.")
 @click.option("--scale", type=Number(min=0, min_open=True), default=None, help="Full scale over model scale.")
 @click.option("--length", "length", type=Number(min=0, min_open=True), default=None, help="L [m], full scale.")
 @click.option(
@@ -42,7 +62,7 @@ def trial(
 
     \b
     Example: ident trial zigzag.csv --json -
-             ident trial zigzag.csv --maneuver "zigzag 20/20" --figures reports
+             ident trial zigzag.csv --maneuver zigzag 20/20 --figures reports
              ident trial model.csv --spec trial.toml --out metrics.csv
     """
     from ident.output import check_folder

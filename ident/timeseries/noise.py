@@ -35,7 +35,7 @@ _DECADES = (-9.0, 13.0)
 _HOPELESS = 1e30
 # The first memory that is tried, in steps of the record, and the longest: a share of the record, beyond which noise
 # cannot be told from motion.
-_FIRST, _LONGEST = 0.5, 1.0 / 16.0
+_FIRST, _LONGEST = 0.5, 1.0 / 50.0
 # Samples further apart than this many of the median steps begin anew.
 _GAP = 4.0
 # Decades about the likeliest smoothing parameter of one memory within which that of the next is sought.

@@ -163,7 +163,7 @@ def start_of(one: Recording, maneuver: Maneuver, spec: TrialFile) -> Start:
             by_control = _of_revolutions(one)
         if by_control is None and (record is None or maneuver.kind in ("roll_decay", "course_keeping", "depth_change")):
             by_control = (begin, 0.0, "execute at the first sample")
-        execute = by_control or _onset(record, path_of(record))  # type: ignore[arg-type]
+        execute = by_control or _onset(record, path_of(record, None))  # type: ignore[arg-type]
     said.append(execute[2])
     known: tuple[float, float] | None = None
     if record is not None and maneuver.kind == "vertical_zigzag":
@@ -240,7 +240,7 @@ def _ordered_course(
     control = control_of(one)
     if control is None or maneuver.check is None:
         return known
-    path, check = path_of(record), math.radians(maneuver.check)
+    path, check = path_of(record, None), math.radians(maneuver.check)
     half = 0.5 * float(np.median(np.diff(control.abscissa)))
     ends = np.array([h.end + half for h in large(holds(control))[:-1] if h.end > execute])
     ends = ends[(ends > record.abscissa[0]) & (ends < record.abscissa[-1])]
@@ -278,7 +278,7 @@ def _entry(record: Record, execute: float) -> tuple[float, float, str] | None:
         return None
     entry = after.kept(slice(0, int(beyond[0])))
     said: list[str] = []
-    path = _from_a_steady_course(path_of(entry), execute, said)
+    path = _from_a_steady_course(path_of(entry, None), execute, said)
     value, bias = float(path(execute)), float(path.again()(execute) - path(execute))
     text = f"from the first {entry.abscissa[-1] - execute:.0f} s of the turn; no approach is recorded"
     return value, math.hypot(float(path.deviation(execute)[0]), bias), "; ".join([text, *said])
@@ -403,7 +403,7 @@ def _joined(
     if len(inside) < 16:
         return None
     pair = regressed(inside.abscissa, inside.value, path(inside.abscissa, 1))
-    own = path_of(inside)
+    own = path_of(inside, None)
     scatter = own.sigma
     offset_error = max(scatter, 1e-12) / math.sqrt(len(inside))
     if pair is None or abs(pair.slope - 1.0) > _CLOSE or abs(pair.offset) > 6.0 * offset_error + 1e-6:

@@ -83,9 +83,16 @@ def regressed(time: Array, value: Array, like: Array) -> Pair | None:
     return Pair(float(slope), float(offset), correlation, float(time[int(np.argmax(away))]))
 
 
-def path_of(record: Record) -> SmoothPath:
-    """The smooth path through a record."""
-    return smooth([Samples(record.abscissa, record.value, 0, 0.0, None)])
+def path_of(record: Record, memory: float | None = 0.0) -> SmoothPath:
+    """The smooth path through a record, for its noise white.
+
+    Parameters
+    ----------
+    record : One channel.
+    memory : None for noise that may be alike from sample to sample. Checks take what is alike for motion: the steps
+        of a rudder under another's name must not pass for noise.
+    """
+    return smooth([Samples(record.abscissa, record.value, 0, 0.0, memory)])
 
 
 def finding_of(

@@ -71,6 +71,7 @@ def _zigzag_events(axes: Axes, one: Trial) -> None:
     for side in (1.0, -1.0):
         axes.axhline(side * check, color="0.6", lw=0.6, ls="--")
     name = _angle(one)
+    last = float(one.paths[name].knots[-5]) - one.start.time
     for k in (1, 2, 3):
         over, at = one.metrics.get(f"overshoot_{k}_deg"), one.metrics.get(f"execute_{k + 1}_s")
         if at is None:
@@ -84,6 +85,8 @@ def _zigzag_events(axes: Axes, one: Trial) -> None:
                 text,
                 (at.value, sense * (check + over.value)),
                 xytext=(4, 4 * sense),
+                # Towards the end of the record to the left, so that it stays inside.
+                ha="right" if at.value > 0.75 * last else "left",
                 textcoords="offset points",
                 fontsize=7,
                 va="bottom" if sense > 0 else "top",

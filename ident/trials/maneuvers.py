@@ -271,7 +271,7 @@ def reversal_angle(t: Array, path: SmoothPath, base: float) -> tuple[float, list
 def _by_angle(one: Recording, name: str) -> tuple[Maneuver, str] | None:
     """A turn or a zigzag, from heading or pitch alone."""
     record = one.channels[name]
-    path = smooth([Samples(record.abscissa, record.value, 0, 0.0, None)])
+    path = smooth([Samples(record.abscissa, record.value, 0, 0.0)])
     base = float(path(record.abscissa[0]))
     turned = path(record.abscissa) - base
     if (

@@ -46,6 +46,8 @@ _MOVES = 4.0
 _DEGREES = math.degrees(1.0)
 # No boat that is steered heels further; what stands under that name is another channel.
 _MOST_HEEL = math.radians(60.0)
+# By how much more a heading has to go with one control than with another to be steered by it.
+_CLOSER = 0.2
 # A heading that has turned so far has been steered before.
 _TURNED = math.radians(2.0)
 _WORDS = {"north": "x", "east": "y"}
@@ -136,6 +138,12 @@ def steered_by_another(one: Recording) -> Iterator[Finding]:
     if "dH" not in controls or "psi" not in one.channels:
         return
     by_rudder, turns = steered(one, "psi", "dH"), _leaves(one.channels["psi"], _TURNED)
+    if by_rudder and "dV" in controls and steered(one, "psi", "dV"):
+        rudder, planes = (_followed(one.channels["psi"], one.channels[c]) for c in ("dH", "dV"))
+        if planes > rudder + _CLOSER:
+            what = f"{one.headers['psi']} follows {one.headers['dV']} more closely than {one.headers['dH']}"
+            yield _pair(one, "dH", "dV", what)
+            return
     if by_rudder and (turns is None or (_moved_at(one.channels["dH"]) or 0.0) <= turns):
         return
     for other in (c for c in _PLAIN if c in one.channels and c not in ("psi", "r", "north", "east", "dH")):
@@ -155,6 +163,17 @@ def steered_by_another(one: Recording) -> Iterator[Finding]:
                 what = f"{one.headers[angle]} answers to {one.headers['dH']}, and {one.headers['psi']} does not"
                 yield _pair(one, "psi", angle, what)
                 return
+
+
+def _followed(angle: Record, control: Record) -> float:
+    """Largest correlation of an angle's rate with a control some time before, within a tenth of the record."""
+    lo, hi = max(angle.abscissa[0], control.abscissa[0]), min(angle.abscissa[-1], control.abscissa[-1])
+    t = np.linspace(lo, hi, _POINTS)
+    rate, moved, later = np.gradient(angle.at(t), t), control.at(t), _POINTS // 10
+    if min(float(np.ptp(rate)), float(np.ptp(moved))) <= 0.0:
+        return 0.0
+    pairs = ((rate[k:], moved[: _POINTS - k]) for k in range(0, later, max(1, later // 20)))
+    return max(abs(float(np.corrcoef(a, b)[0, 1])) if np.ptp(a) and np.ptp(b) else 0.0 for a, b in pairs)
 
 
 def _leaves(record: Record, size: float) -> float | None:

@@ -85,8 +85,18 @@ def referenced(case: Case, where: str) -> Referenced:
         return Referenced(case, load_reference(case, where))
     from ident.trials.spec import TrialFile, load_spec
 
-    spec = load_spec(folder / given.trial) if given.trial else TrialFile(frame=None)
-    return with_trial(case, folder / given.file, spec, given.controls == "recorded")
+    spec = load_spec(folder / given.trial) if given.trial else TrialFile()
+    if given.frame != _PROGRAM:
+        if spec.frame not in (None, given.frame):
+            raise InputError(
+                f"{where}, key reference.frame", f"another than in {given.trial}", "the frame in one of them"
+            )
+        spec = spec.model_copy(update={"frame": given.frame})
+    held = with_trial(case, folder / given.file, spec, given.controls == "recorded")
+    compared = held.case.reference.channels if held.case.reference else []
+    if missing := [c for c in given.channels if c not in compared]:
+        raise InputError(f"{where}, key reference.channels", ", ".join(missing), f"recorded: {', '.join(compared)}")
+    return held
 
 
 def _long_or_missing(path: Path) -> bool:
@@ -124,7 +134,7 @@ def with_trial(case: Case, path: Path, spec: TrialFile, recorded: bool) -> Refer
         frame=given.frame if given else _PROGRAM,
         initial={TRIAL: begun},
     )
-    held = case.model_copy(update={"reference": reference, "tolerance": [], "published": []})
+    held = case.model_copy(update={"reference": reference})
     driven, said = _driven(held, trial)
     if recorded and driven is None:
         raise InputError(f"{path}, recorded controls", said[0], "a column of the rudder or plane angle")

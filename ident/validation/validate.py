@@ -186,6 +186,7 @@ def _with_reference(case: Case, record: OwnReference) -> Referenced:
         from ident.trials.spec import load_spec
 
         spec = load_spec(Path(trial) if trial else None)
+        case = case.model_copy(update={"tolerance": [], "published": []})
         return with_trial(case, path, spec.model_copy(update={"frame": _FRAMES[frame]}) if frame else spec, False)
     header = path.read_bytes().partition(b"\n")[0].strip().split(b",")
     abscissa: Literal["t", "s"] = "s" if b"s" in header and b"t" not in header else "t"

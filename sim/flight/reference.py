@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from sim.files.schema import Data, FrameData, Positive
 
@@ -43,7 +43,7 @@ class Reference(Data):
     compare : Sources that the flight is held against.
     channels : Channels that are compared.
     abscissa : ``t``: over time [s]. ``s``: over the path length over ground [m].
-    frame : Axes of the series.
+    frame : Axes of the series; of a trial those of the program, unless here or in ``trial``.
     initial : Source -> its own start; it is compared with a run from there.
     from_start : Channels that are changes since the start, so that every series begins at zero whatever
         offset it was published with.
@@ -59,6 +59,13 @@ class Reference(Data):
     frame: FrameData
     initial: dict[str, Start] = Field(default_factory=dict)
     from_start: list[str] = Field(default_factory=list)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _trial_in_program_axes(cls, data: Any) -> Any:
+        if isinstance(data, dict) and data.get("trial") and "frame" not in data:
+            return data | {"frame": {"x": "forward", "y": "starboard", "z": "down"}}
+        return data
 
 
 class Published(Data):
