@@ -12,6 +12,7 @@ import logging
 import multiprocessing
 import os
 import signal
+import sys
 import threading
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -146,6 +147,20 @@ def _ready(read: Iterable[Path] | None) -> None:
         inputs.begin(read)
     if hasattr(signal, "pthread_sigmask"):
         signal.pthread_sigmask(signal.SIG_UNBLOCK, _ASKS)
+
+
+@contextlib.contextmanager
+def _without_a_word() -> Iterator[None]:
+    """Python's process that clears up after a pool says nothing of what a command that is ended leaves to it.
+
+    It is started with the flags of this one, at the first pool.
+    """
+    flag = "ignore:resource_tracker:UserWarning"
+    sys.warnoptions.append(flag)
+    try:
+        yield
+    finally:
+        sys.warnoptions.remove(flag)
 
 
 @contextlib.contextmanager
@@ -284,7 +299,8 @@ def begun(draw: Callable[..., T], jobs: Sequence[tuple[Any, ...]], workers: int 
         yield lambda: [draw(*job) for job in jobs]
         return
     shared = _Shared(draw, jobs)
-    pool = ProcessPoolExecutor(others, multiprocessing.get_context("spawn"), _ready, (inputs.noted(),))
+    with _without_a_word():
+        pool = ProcessPoolExecutor(others, multiprocessing.get_context("spawn"), _ready, (inputs.noted(),))
 
     def finish() -> list[T]:
         shared.here()

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -112,3 +114,19 @@ def test_axes_have_one_power_of_ten(values, power, first):
     figure.draw_without_rendering()
     assert axes.yaxis.get_offset_text().get_text() == power
     assert axes.yaxis.get_ticklabels()[0].get_text() == first
+
+
+@pytest.mark.skipif(os.name != "posix", reason="the process that clears up is of POSIX")
+def test_a_command_that_ends_in_the_middle_leaves_no_word(tmp_path):
+    """What a signal ends has no time to give semaphores back: Python's own process does, without a warning."""
+    script = (
+        "import os, time\nfrom ident.drawing import beside\n"
+        "def draw(k):\n    if k < 2:\n        time.sleep(0.5)\n        os._exit(143)\n    time.sleep(1.0)\n"
+        "if __name__ == '__main__':\n    beside(draw, [(k,) for k in range(20)], 2)\n"
+    )
+    (tmp_path / "drawn.py").write_text(script)
+    env = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
+    done = subprocess.run(
+        [sys.executable, tmp_path / "drawn.py"], env=env, capture_output=True, text=True, timeout=60, check=False
+    )
+    assert (done.returncode, done.stderr) == (143, "")

@@ -111,7 +111,7 @@ def _refuse_inputs(command: click.Command, values: dict[str, Any]) -> None:
         if not _is_written(parameter) or given in (None, "-"):
             continue
         target = Path(os.path.realpath(given))
-        refuse_database(target)
+        refuse_database(Path(given))
         if parameter.callback is _folder or not target.is_file():
             continue
         for one in inputs:

@@ -30,6 +30,8 @@ Maneuver = Literal[
 
 # A record of more steps than this does not fit a laptop's memory.
 _MOST_STEPS = 1e7
+# Of depth, in a maneuver that is one [m].
+_LEAST_CHANGE = 1e-3
 
 
 class Initial(Data):
@@ -152,8 +154,10 @@ class Case(Data):
     @model_validator(mode="after")
     def _changes_depth_by_something(self) -> Case:
         steps = self.command.dV.step
-        if self.maneuver == "depth_change" and not (steps and steps[-1].distance_m):
-            raise ValueError("a depth_change whose last step of dV has a distance_m that is not zero")
+        if self.maneuver == "depth_change" and not (steps and abs(steps[-1].distance_m or 0.0) > _LEAST_CHANGE):
+            raise ValueError(
+                "a depth_change whose last step of dV has a distance_m that is not zero: a millimetre at least"
+            )
         return self
 
     @model_validator(mode="after")
