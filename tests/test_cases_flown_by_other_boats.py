@@ -106,3 +106,12 @@ def test_a_boat_without_a_rudder_in_its_terms_says_so(suboff_db, tmp_path):
     done = CliRunner().invoke(main, ["validate", "--case", "suboff-hzz10", "--vehicle", str(path), *arguments])
     assert done.exit_code == 2
     assert "no plane of suboff has a share in it" in done.output
+
+
+def test_a_limit_of_revolutions_goes_with_the_boat_by_froudes_law():
+    """The square root of the lengths: revolutions times the square root of a length are alike."""
+    case, where = load_case("crash-stop")
+    boat, own = load_vehicle("suboff"), load_vehicle("bb2")
+    moved, _ = for_boat(case, where, boat, Conditions())
+    root = np.sqrt(own.particulars.length.value / boat.particulars.length.value)
+    assert moved.command.n.limits_rps == pytest.approx([limit * root for limit in case.command.n.limits_rps], rel=1e-6)

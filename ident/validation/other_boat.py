@@ -62,6 +62,8 @@ def _commands(command: Commands, ratio: float) -> Commands:
                 if getattr(step, key, None):
                     change[key] = getattr(step, key) * ratio**power
             steps.append(step.model_copy(update=change))
+        if getattr(one, "limits_rps", None):
+            moved["limits_rps"] = [limit * ratio**-0.5 for limit in one.limits_rps]
         updates[axis] = one.model_copy(update=moved | {"step": steps})
     return command.model_copy(update=updates)
 
