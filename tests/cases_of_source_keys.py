@@ -183,6 +183,6 @@ SAID = {
     "Source.encoding": "not utf-16-le text",
     "Source.reduction": "only time histories are reduced",
     "Source.awaited": "no file 'late.csv'",
-    "Source.deduction": "identify nothing",
+    "Source.deduction": "its loads would be left out",
     "Reduction.rate_hz": "Y oscillates at 0.275 Hz",
 }

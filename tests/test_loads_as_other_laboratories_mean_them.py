@@ -231,6 +231,40 @@ def test_buoyancy_is_taken_off_with_its_moment(tmp_path, attitude):
     assert (run["X"], run["Z"], run["M"]) == pytest.approx((-30.0, -20.0, 15.0), abs=1e-9)
 
 
+@pytest.mark.parametrize("motion", ["roll", "pitch", "heave"])
+def test_buoyancy_turns_in_the_axes_of_a_body_that_rolls_or_pitches(tmp_path, motion):
+    """Gravity by hand, sample by sample; a heaving body keeps its attitude, whatever its flow."""
+    force, (x, z), swing = 9100.0, (0.3, -0.2), 0.25
+    t = np.arange(1600) / 20.0
+    angle = swing * np.sin(OMEGA * t)
+    phi, theta = (angle if motion == m else 0.0 * angle for m in ("roll", "pitch"))
+    up = -force * np.stack([-np.sin(theta), np.cos(theta) * np.sin(phi), np.cos(theta) * np.cos(phi)], axis=1)
+    loads = np.hstack([up, np.cross([x, 0.0, z], up)])
+    # The water's: a damping and an added inertia about the axis that moves.
+    own = {"roll": 3, "pitch": 4, "heave": 2}[motion]
+    loads[:, own] += -500.0 * swing * OMEGA * np.cos(OMEGA * t) + 900.0 * swing * OMEGA**2 * np.sin(OMEGA * t)
+    table = pd.DataFrame(loads, columns=["X_N", "Y_N", "Z_N", "K_Nm", "M_Nm", "N_Nm"])
+    table.insert(0, "time_s", t)
+    table["displacement_m" if motion == "heave" else "displacement_rad"] = angle
+    hydrostatics = f'force_n = {force}\ncentre_m = [{x}, 0.0, {z}]\nattitude = "pitched"\nsource = "s"'
+    runs = swayed(tmp_path, table, reduction=SWAY.replace("sway", motion), hydrostatics=hydrostatics)
+    at = runs.set_index(runs["run_id"].str[-2:])
+    load = "XYZKMN"[own]
+    assert at[load]["+a"] == pytest.approx(900.0 * swing * OMEGA**2, rel=3e-4)
+    assert at[load]["-v"] == pytest.approx(500.0 * swing * OMEGA, rel=3e-4)
+    others = at[[o for o in "XYZKMN" if o != load]].to_numpy(float)
+    # The third harmonic is left out of the ends of the acceleration; nothing else is.
+    assert np.abs(others).max() < 1e-4 * force
+    assert not {"stood", "heel", "trim"} & set(runs)
+    assert not [f for f in check_campaign(read_campaign(tmp_path), tmp_path) if f.check == "hydrostatic"]
+    if motion == "pitch":
+        # Half of the boat's weight, left in.
+        table["Z_N"] -= 2.2e7
+        swayed(tmp_path / "left_in", table, reduction=SWAY.replace("sway", motion))
+        named = check_campaign(read_campaign(tmp_path / "left_in"), tmp_path / "left_in")
+        assert [f for f in named if f.check == "hydrostatic"]
+
+
 # -- samples that are no measurements --------------------------------------------------------------
 
 

@@ -129,6 +129,53 @@ def test_five_laboratories_together_give_bb2s_coefficients(tables, rows, tmp_pat
     assert_same(got, rows, 1e-9)
 
 
+def habits_of_a_basin(tables):
+    """All at once: axes by the left hand, ITTC drift, other water, a model, its own moment point, feet and pounds."""
+    ratio, point = 18.348, (0.21, -0.05, 0.13)
+    made = moved(turned(scaled(in_water(tables, 1000.0), ratio), {"x": -1, "y": 1, "z": 1}, -1), point, 1)
+    for table in made.values():
+        if "beta_deg" in table:
+            table["beta_deg"] = text(-number(table["beta_deg"]))
+    head = frame_text("forward", "starboard", "up", "left-hand", "ittc")
+    head = head.replace("density_kgpm3 = 1025.0", "density_kgpm3 = 1000.0").replace("ratio = 1.0", f"ratio = {ratio}")
+    head = head.replace("length_m = 70.2", f"length_m = {70.2 / ratio}")
+    for axis, value in zip("xyz", point, strict=True):
+        head = head.replace(f"{axis}_m = 0.0", f"{axis}_m = {value}")
+    return in_units(made), head
+
+
+def habits_of_a_tunnel(tables):
+    """Full scale about the stern, thousands of newton metres under N, resistance positive aft, axes to port."""
+    point = (-31.0, 0.4, 1.5)
+    made, _ = thousandths(moved(turned(tables, {"x": 1, "y": -1, "z": 1}, -1), point, 1))
+    _, head = thousandths(tables)
+    head = head.replace('y = "starboard"', 'y = "port"\nrotations = "left-hand"')
+    for axis, value in zip("xyz", point, strict=True):
+        head = head.replace(f"{axis}_m = 0.0", f"{axis}_m = {value}")
+    return made, head
+
+
+def test_two_facilities_with_every_habit_that_measured_the_same_runs_give_bb2s_coefficients(tables, rows, tmp_path):
+    """Each has the whole campaign in its own form; together they are BB2's, and nothing stands between them."""
+    for name, habit in (("basin", habits_of_a_basin), ("tunnel", habits_of_a_tunnel)):
+        made, head = habit(tables)
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "campaign.toml").write_text(head.replace('"bb2-captive-2021"', f'"{name}"'), "utf-8")
+        for file, table in made.items():
+            table.to_csv(tmp_path / name / file, index=False)
+    found = together(tmp_path)
+    assert {one.output for one in found.between} >= {"X", "Y", "N"}
+    assert not any(one.tau > 0.0 for one in found.between)
+    got = database_rows(found)
+    assert len(got) == len(rows)
+    # But for the wake, which is of one self-propulsion run, each value rests on the runs of both.
+    assert (got["n_runs"] == 2 * rows["n_runs"]).mean() > 0.95
+    key = [rows["coefficient"], rows["part"]]
+    largest = rows["value"].abs().groupby(key).transform("max")
+    off = (got["value"] - rows["value"]).abs() / largest.where(largest > 0.0, 1.0)
+    assert off.max() < 1e-9, rows.loc[off.idxmax(), ["coefficient", "part", "value"]].to_dict()
+
+
 # -- facilities that differ ------------------------------------------------------------------------
 
 

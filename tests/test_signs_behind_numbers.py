@@ -92,6 +92,32 @@ def test_a_dimensionless_header_holds_the_multiple_it_names(header, quantity, fa
     assert (kind.quantity, kind.factor) == (quantity, pytest.approx(factor, rel=1e-15))
 
 
+@pytest.mark.parametrize(
+    ("header", "declared"),
+    [
+        *((h, "KQ") for h in ("KQ/10", "0.1 KQ", "10-KQ", "10_KQ", "KQ 10^2", "KQ [%]", "KQ (1e-1)", "KQ [1/10]")),
+        *(
+            (h, "Y [-]")
+            for h in ("Y' 10^3", "Y' (10-3)", "Y' [1e-3]", "Y'/1000", "Y' in 1/1000", "Y' [\u2030]", "Y'e3")
+        ),
+        *((h, "rel_sigma") for h in ("rel_sigma [%]", "rel_sigma_pct", "error (per cent)", "sigma in \u2030")),
+        *((h, "value") for h in ("1000 value", "value 10^5", "value in thousandths")),
+        *((h, "t") for h in ("t [%]", "t (per mille)")),
+    ],
+)
+def test_a_declared_header_that_holds_a_power_of_ten_or_a_share_asks_for_the_factor(header, declared):
+    """Its declaration says what it is and not how much: the power would be lost as a part of the name."""
+    with pytest.raises(InputError, match=r"names a multiple|one unit"):
+        column(header, declared, "f")
+    if "[" not in header:
+        assert column(header, declared, "f", factored=True).factor == 1.0
+
+
+@pytest.mark.parametrize("header", ["Ch 10", "Gauge 100", "1. Fx", "ch1/ch10", "Speed (100 %)", "X (10^-3 kN)"])
+def test_numbers_of_channels_are_no_multiples(header):
+    assert column(header, "U [m/s]" if "Speed" in header else "X [N]", "f").factor == 1.0
+
+
 @pytest.mark.parametrize("header", ["Y x1000", "X x1000 [N]", "Y' x10^-3", "Fx x1000"])
 def test_a_header_that_can_be_meant_two_ways_asks_for_the_factor(header):
     with pytest.raises(InputError, match="factor"):

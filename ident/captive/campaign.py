@@ -22,7 +22,7 @@ from ident.captive import published
 from ident.captive.axes import to_body
 from ident.captive.campaign_file import CampaignFile, read_header
 from ident.captive.channels import NotRising
-from ident.captive.complete import check_complete, check_words
+from ident.captive.complete import check_complete, check_parts, check_words
 from ident.captive.conversions import (
     arm_rates,
     deflected_left_out,
@@ -157,6 +157,7 @@ def read_runs(
         for table in source_runs(folder, source, header, gathered, tell, spread):
             check_words(folder, table, {**words, "decoupled": ["", "True", "False"]})
             check_complete(folder, table, vehicle)
+            check_parts(folder, table, vehicle)
     runs = pd.concat(gathered.tables, ignore_index=True) if gathered.tables else pd.DataFrame()
     for column in NUMBERS:
         if column not in runs:

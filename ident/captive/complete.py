@@ -8,9 +8,10 @@ import numpy as np
 import pandas as pd
 
 from ident.captive.known_tests import tests
+from ident.captive.published import TEST as PUBLISHED
 from ident.captive.run_table import DIRECT, MEASURED, sigma
 from sim.boat.catalogue import OUTPUTS
-from sim.boat.parts import vehicle_terms
+from sim.boat.parts import parts_of, vehicle_terms
 from sim.boat.vehicle import Vehicle
 from sim.files.errors import InputError
 
@@ -35,6 +36,37 @@ def check_words(folder: Path, runs: pd.DataFrame, allowed: dict[str, list[str]])
             run = runs[bad].iloc[0]
             place = f"{folder / run['file']}, row {run['row']}, column {column}"
             raise InputError(place, repr(run[column]), ", ".join(words))
+
+
+def check_parts(folder: Path, runs: pd.DataFrame, vehicle: Vehicle) -> None:
+    """Every run is of a part that its test says something of, and levers are those of sections.
+
+    Parameters
+    ----------
+    folder : Of the campaign, for the message.
+    runs : As read.
+    vehicle : For its terms: the part of each, and the tests that identify it.
+
+    Raises
+    ------
+    InputError
+        Naming file, row and column of the first run whose loads would be left out, or whose lever nothing uses.
+    """
+    parts: dict[str, set[str]] = {}
+    for term in vehicle_terms(vehicle):
+        for test in term.tests:
+            parts.setdefault(test, set()).update(parts_of(term, vehicle))
+    sections = {s.name for s in vehicle.sections.centres} if vehicle.sections else set()
+    for (of_test, part), group in runs.groupby(["test", "part"], sort=False):
+        test = str(of_test)
+        place = f"{folder / group['file'].iloc[0]}, row {group['row'].iloc[0]}, column "
+        if test != PUBLISHED and part not in parts.get(test, {part}):
+            text = f"{', '.join(sorted(parts[test]))}: no coefficient of another part is identified by {test} runs"
+            raise InputError(place + "part", f"{part!r}, and its loads would be left out", text)
+        for lever in ("x", "y", "z"):
+            if part not in sections and lever in group and group[lever].notna().any():
+                text = "nothing: levers are those of the vehicle file's sections, which alone are compared"
+                raise InputError(place + lever, f"{group[lever].dropna().iloc[0]:g}, declared and unused", text)
 
 
 def _doubtful(runs: pd.DataFrame) -> np.ndarray:

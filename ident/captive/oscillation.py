@@ -26,6 +26,10 @@ PHASES = {"+v": 0.0, "-v": math.pi, "+a": math.pi / 2, "-a": 3 * math.pi / 2}
 _AGREE = 0.02
 # Those measured, and what was taken off them.
 _LOADS = (*OUTPUTS, *(TAKEN + o for o in OUTPUTS))
+# Angles of the body at an instant, columns that go with the hydrostatic load: the incidence that it stands at
+# before the oscillation adds to the flow, and what roll and pitch turn gravity by in its axes.
+STOOD, HEEL, TRIM = "stood", "heel", "trim"
+_TURNS_GRAVITY = {"roll": HEEL, "pitch": TRIM}
 # Test whose terms a state at the end of the velocity identifies.
 _STEADY_TEST = {"surge": "towing", "sway": "drift_horizontal", "heave": "drift_vertical"}
 
@@ -106,6 +110,10 @@ def states(run: Oscillation, rule: Reduction, frame: Frame, ittc: bool, where: s
         at_velocity = name.endswith("v")
         _move(state, speed_name, speed * math.cos(theta) if at_velocity else 0.0, frame, ittc)
         state[acceleration_name] = 0.0 if at_velocity else given * math.sin(theta)
+        state[STOOD] = float(np.nan_to_num(run.state.get("alpha", 0.0) or 0.0))
+        if rule.motion in _TURNS_GRAVITY:
+            swing = frame.sign(speed_name) * speed / omega
+            state[_TURNS_GRAVITY[rule.motion]] = swing * math.sin(theta)
         usual = _STEADY_TEST.get(rule.motion, "rotating_arm")
         state["test"] = (run.state.get("test") or usual) if at_velocity else "acceleration"
         weights = phase_row(theta)

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
+from scipy.special import j1
 
 from ident.captive.campaign_file import CampaignFile, Tare
+from ident.captive.oscillation import HEEL, STOOD, TRIM
 from ident.captive.quantities import TAKEN, factor
 from ident.captive.run_table import MOTION
 from sim.boat.catalogue import ACCELERATIONS, OUTPUTS
@@ -13,25 +16,40 @@ from sim.boat.forces import body_velocity
 from sim.files.errors import InputError
 from sim.files.frames import Frame
 
+Array = NDArray[np.float64]
+
+# Columns of an oscillation's states that say where gravity is in the body.
+_ATTITUDE = (STOOD, HEEL, TRIM)
+
 
 def without_hydrostatics(runs: pd.DataFrame, header: CampaignFile, frame: Frame) -> pd.DataFrame:
     """Take the stated hydrostatic load off, about the vehicle's origin, in the program frame.
 
     A force B upwards at r_B: F = -B g, M = r_B x F, with g the direction of gravity in the body,
-    (0, 0, 1) level and (-sin alpha, 0, cos alpha) pitched.
+    (-sin theta, cos theta sin phi, cos theta cos phi): theta is zero level and alpha pitched, and a body that
+    oscillates in roll or pitch has the angle of the instant too. The flow of a heaving body does not pitch it.
     """
+    out = runs.drop(columns=[c for c in _ATTITUDE if c in runs])
     stated = header.hydrostatics
     if stated is None:
-        return runs
+        return out
     chosen = runs["part"].isin(stated.parts)
-    pitch = runs["alpha"].fillna(0.0).to_numpy(float) * (stated.attitude == "pitched")
-    force = -stated.force_n * np.stack([-np.sin(pitch), np.zeros(len(runs)), np.cos(pitch)], axis=1)
+    stood, heel, trim = (runs[c] if c in runs else pd.Series(np.nan, index=runs.index) for c in _ATTITUDE)
+    stands = (stood.where(stood.notna(), runs["alpha"]).fillna(0.0) * (stated.attitude == "pitched")).to_numpy(float)
+    (sin_t, cos_t), (sin_p, cos_p) = (_swung(np.asarray(angle.fillna(0.0), dtype=float)) for angle in (trim, heel))
+    sin, cos = np.sin(stands) * cos_t + np.cos(stands) * sin_t, np.cos(stands) * cos_t - np.sin(stands) * sin_t
+    gravity = [-sin, cos * sin_p, cos * cos_p]
+    force = -stated.force_n * np.stack(gravity, axis=1)
     arm = np.broadcast_to(np.array(frame.vector(stated.centre_m)), force.shape)
     load = np.hstack([force, np.cross(arm, force)])
-    out = runs.copy()
     for output, one in zip(OUTPUTS, load.T, strict=True):
         out[output] = out[output] - np.where(chosen, one, 0.0)
     return out
+
+
+def _swung(angle: Array) -> tuple[Array, Array]:
+    """Sine and cosine of A sin(wt) at its ends; of the sine the first harmonic 2 J1(A): the third is left out."""
+    return 2.0 * j1(angle), np.cos(angle)
 
 
 def tare_applies(runs: pd.DataFrame, tare: Tare) -> pd.Series:

@@ -52,11 +52,22 @@ _TENS = (
     r"1(?P<zeros>0{1,6})|10\s*(?:\^|\*\*)\s*(?P<power>[1-6])|10(?P<raised>[\u00b9\u00b2\u00b3\u2074-\u2076])"
     r"|1[eE]\+?(?P<e>[1-6])"
 )
-_BEFORE = re.compile(rf"(?:{_TENS})\s*[*\u00b7x\u00d7]?\s*(?P<name>[A-Za-z]+'?)\s*(?:\[-?\]|\(-?\))?")
-_BEHIND = re.compile(rf"(?P<name>[A-Za-z]+'?)\s*(?:\[-?\]|\(-?\))?\s*\(?\s*[*\u00b7x\u00d7]\s*(?:{_TENS})\s*\)?")
+_SIGN = "[*x\u00b7\u00d7\u2219\u2022\u22c5\u2217]"
+_BEFORE = re.compile(rf"(?:{_TENS})\s*{_SIGN}?\s*(?P<name>[A-Za-z]+'?)\s*(?:\[-?\]|\(-?\))?")
+_BEHIND = re.compile(rf"(?P<name>[A-Za-z]+'?)\s*(?:\[-?\]|\(-?\))?\s*\(?\s*{_SIGN}\s*(?:{_TENS})\s*\)?")
 _TIMES = re.compile(
-    r"(?i)(^|\s|\()1(0{1,6}|e[+-]?\d)\s*[*\u00b7x]?\s*[a-z]{1,2}(?![a-z])"
-    r"|[x\u00d7*\u00b7]\s*(10{1,6}|10\s*(\^|\*\*|e)\s*[-+]?\d+|1e[+-]?\d+)\b"
+    rf"(?i)(^|\s|\()1(0{{1,6}}|e[+-]?\d)\s*{_SIGN}?\s*[a-z]{{1,2}}(?![a-z])"
+    rf"|{_SIGN}\s*(10{{1,6}}|10\s*(\^|\*\*|e)\s*[-+]?\d+|1e[+-]?\d+)\b"
+)
+# Powers of ten in any other place of a header, which a declaration would let pass as a part of its name: KQ/10, 0.1 KQ,
+# Y' 10^3, Y' (10-3), 1/1000; and shares of a hundred or a thousand of what has no unit.
+_TEN_SOMEWHERE = re.compile(
+    r"10\s*(?:\^|\*\*)\s*[-+\u2212\u2013]?\s*\d|10[\u207b\u207a]?[\u00b9\u00b2\u00b3\u2074-\u2079]"
+    r"|[\[(]\s*10\s*[-\u2212\u2013]\s*\d\s*[\])]|\b1[eE][-+\u2212]?\d\b|'[eE][-+]?\d\b|\b1\s*/\s*10{1,6}\b"
+    r"|/\s*(?:10{1,6}|0?\.0*1)(?![\d.])|(?:^|[\s(\[])0?\.0*1\s*[*x\u00b7\u00d7]?\s*[A-Za-z]"
+)
+_SHARE = re.compile(
+    r"(?i)[%\u2030]|(?<![a-z])(?:per\s?cent|pct|per\s?mill?e?|pro\s?mill?e?|pp[mt]|(?:hundred|thousand)ths?)(?![a-z])"
 )
 # Names of other papers and laboratories -> the quantity that is meant, for the message.
 _MEANT = {
@@ -317,6 +328,23 @@ def _multiple(header: str, declared: str | None) -> Column | None:
     return None
 
 
+def _other_multiple(header: str, declared: str | None) -> bool:
+    """Whether a declared header holds a power of ten outside of its unit, or is a share of what has no unit."""
+    if declared is None:
+        return False
+    name, unit = split(declared)
+    quantity = owner(name.removesuffix("'"))
+    if not quantity:
+        return False
+    own, stated = split(header)
+    plain = "" in units()[quantity] or name.endswith("'") or unit in _NO_UNIT
+    # Of a unit the power of ten is read with it.
+    rest = own if stated and factor(quantity, stated) is not None else header
+    letters = re.sub(r"[^a-z]", "", own.lower())
+    before = re.match(r"10{1,6}[-_\s]", header) and letters == re.sub(r"[^a-z]", "", name.lower())
+    return bool(_TEN_SOMEWHERE.search(rest) or before or (plain and _SHARE.search(rest)))
+
+
 def column(header: str, declared: str | None, where: str, factored: bool = False) -> Column:
     """What a column is, from its header and what the campaign declares it to be.
 
@@ -338,7 +366,7 @@ def column(header: str, declared: str | None, where: str, factored: bool = False
     place = f"{where}, column {header[:60]!r}"
     if not factored and (multiple := _multiple(header, declared)) is not None:
         return multiple
-    if _TIMES.search(header) and not factored:
+    if not factored and (_TIMES.search(header) or _other_multiple(header, declared)):
         text = "a factor in [source.factor]: what a value is multiplied by to give the quantity"
         raise InputError(place, "a header that names a multiple", text)
     if declared is not None and declared in suffixed():

@@ -8,16 +8,16 @@ from collections.abc import Sequence
 import numpy as np
 import pandas as pd
 
+from ident.captive import known_tests
 from ident.captive.published import TEST as PUBLISHED
 from ident.captive.quantities import HARMONICS, POLAR, Column, owner, split
-from ident.captive.run_table import STATES
+from ident.captive.run_table import MOTION, STATES
 from ident.captive.source import Source
 from sim.boat.catalogue import ACCELERATIONS, OUTPUTS
 from sim.files.errors import InputError
 
 # Quantities of a history or of an oscillation that mean nothing in a plain run.
 _OF_HISTORIES = ("time", "displacement", "frequency", "amplitude")
-_LEVERS = ("x", "y", "z")
 
 
 class Uses:
@@ -131,16 +131,34 @@ def refuse_idle_quantities(runs: pd.DataFrame) -> None:
             text = "zero, or the test acceleration: any other run is steady"
             _refuse(runs, (runs["test"] != "acceleration") & (runs[name].fillna(0.0) != 0.0), name, text)
     for name in ("alpha", "beta"):
-        if name in runs:
+        if name in runs and "U" in runs:
             text = "zero or empty: a boat at rest (U = 0) has no angle of flow"
             _refuse(runs, (runs["U"] == 0.0) & (runs[name].fillna(0.0) != 0.0), name, text)
-    if "J" in runs:
-        text = "nothing: an advance coefficient is of a propeller's runs"
-        _refuse(runs, runs["J"].notna() & (runs["part"] != "propeller"), "J", text)
-    for name in _LEVERS:
-        if name in runs:
-            text = "nothing: levers are those of the vehicle file's sections, which alone are compared"
-            _refuse(runs, runs[name].notna() & runs["part"].isin(["hull", "propeller"]), name, text)
+    _refuse_other_states(runs[~published])
+
+
+def _refuse_other_states(runs: pd.DataFrame) -> None:
+    """Refuse states that no coefficient of a run's test depends on: a towed run's yaw rate, an arm's radius."""
+    for test in runs["test"].unique():
+        if test not in known_tests.tests().index:
+            continue
+        of_test = runs[runs["test"] == test]
+        allowed = known_tests.states(str(test))
+        text = f"nothing: no coefficient that a {test} run identifies depends on it"
+        for name in (*STATES[1:7], *MOTION[:3], "R0"):
+            if name in of_test and name not in (*allowed, "D0"):
+                given = of_test[name].notna() if name in ("J", "R0") else of_test[name].fillna(0.0) != 0.0
+                _refuse(of_test, given, name, text)
+        if test == "open_water" and {"U", "n"} & set(of_test):
+            both = [of_test[c].fillna(0.0) if c in of_test else 0.0 * of_test["J"] for c in ("U", "n")]
+            text = "U and n together, of which J = U/(nD) is made, or neither"
+            name = "U" if "U" in of_test and (both[0] != 0.0).any() else "n"
+            if name in of_test and "J" in of_test:
+                alone = ((both[0] != 0.0) != (both[1] != 0.0)) & (of_test["J"] != 0.0)
+                _refuse(of_test, alone & (of_test[name].fillna(0.0) != 0.0), name, text)
+        if "decoupled" not in allowed and "decoupled" in of_test:
+            taken_off = "nothing: no load of other terms is taken off such a run"
+            _refuse(of_test, of_test["decoupled"].astype(str) == "True", "decoupled", taken_off)
 
 
 def _refuse(runs: pd.DataFrame, idle: pd.Series, column: str, text: str) -> None:

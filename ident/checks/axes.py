@@ -65,7 +65,10 @@ def weight_in_the_loads(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
     if body is None or body.mass is None:
         return
     weight = body.mass * rule.limits["gravity"]
-    runs = evidence.runs[_still(evidence.runs) & kept(evidence.runs, "Z")]
+    hull = evidence.runs["part"].isin(_HULL)
+    # What the two sides of an oscillation have in common stands still in it.
+    swung = hull & evidence.runs["run_id"].astype(str).str.contains(r"[+-][av]$")
+    runs = evidence.runs[(_still(evidence.runs) | swung) & kept(evidence.runs, "Z")]
     level = runs["alpha"].fillna(0.0).abs() < math.radians(rule.limits["level"])
     for file, group in runs[level].groupby(together(runs[level]), sort=False):
         z = prime(group, "Z", body)
@@ -85,6 +88,18 @@ def thrust_in_x(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
     for file, group in pushed.groupby(together(pushed), sort=False):
         what = f"X of {len(group)} hull runs with the propeller at {group['n'].min():g} to {group['n'].max():g} rev/s"
         yield rule.finding(str(file), rows_of(group), ["X", "n"], what)
+
+
+@check("propeller_on")
+def revolutions_beside_other_loads(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
+    """Other loads with revolutions: no coefficient depends on them, so what the propeller does is in the loads."""
+    runs = evidence.runs
+    turning = runs[(runs["n"].fillna(0.0) != 0.0) & ~runs["test"].isin(["open_water", "self_propulsion"])]
+    turning = turning[~(turning["part"].isin(_HULL) & kept(turning, "X"))]
+    for file, group in turning.groupby(together(turning), sort=False):
+        what = f"loads of {len(group)} runs with the propeller at {group['n'].min():g} to {group['n'].max():g} rev/s, "
+        what += "on which no coefficient of theirs depends: what the propeller does to them is in them"
+        yield rule.finding(str(file), rows_of(group), ["n"], what, "info")
 
 
 # -- between tests -------------------------------------------------------------------------

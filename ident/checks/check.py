@@ -27,7 +27,9 @@ from ident.checks import fitted as checks_fitted
 from ident.checks import histories as checks_histories
 from ident.checks import lines as checks_lines
 from ident.checks import physics as checks_physics
+from ident.checks import planes as checks_planes
 from ident.checks import possible as checks_possible
+from ident.checks import potential as checks_potential
 from ident.checks import runs as checks_runs
 from ident.checks import tables as checks_tables
 from ident.checks.findings import SEVERITIES, Body, Evidence, Finding, registered, rules
@@ -50,7 +52,9 @@ _MODULES = (
     checks_histories,
     checks_lines,
     checks_physics,
+    checks_planes,
     checks_possible,
+    checks_potential,
     checks_runs,
     checks_tables,
 )

@@ -186,17 +186,19 @@ def drift_or_rudder(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
 # -- inertia -----------------------------------------------------------------------------
 
 
-def _apparent(evidence: Evidence) -> Iterator[tuple[str, str, pd.DataFrame, float]]:
+def apparent_inertia(evidence: Evidence) -> Iterator[tuple[str, str, pd.DataFrame, float]]:
     """File, acceleration, runs and apparent added inertia -load/acceleration of the whole body.
 
     Loads of parts in one state are added; least squares through the origin over the
-    accelerations, with every run of its file accelerated along one axis only.
+    accelerations, with every run of its file accelerated along one axis only. What the two sides of an
+    oscillation have in common is no load of the acceleration, nor is the resistance of a boat with way on.
     """
     runs = evidence.runs
     moving = runs[list(ACCELERATIONS)].fillna(0.0) != 0.0
     for acceleration, output in _ANSWERS.items():
-        alone = moving[acceleration] & (moving.sum(axis=1) == 1) & kept(runs, output)
-        for file, group in runs[alone].groupby("file", sort=False):
+        alone = runs[moving[acceleration] & (moving.sum(axis=1) == 1) & kept(runs, output)]
+        alone = alone.assign(**{output: _of_acceleration(alone, acceleration, output)})
+        for file, group in alone[alone[output].notna()].groupby("file", sort=False):
             # Repeated runs of a part are one load of it; the parts make the whole.
             parts = group.groupby([acceleration, group["D0"].fillna(0.0), "part"])[output].mean()
             whole = parts.groupby(level=[0, 1]).sum().reset_index()
@@ -207,10 +209,19 @@ def _apparent(evidence: Evidence) -> Iterator[tuple[str, str, pd.DataFrame, floa
             yield str(file), acceleration, group, -float(x @ y / (x @ x))
 
 
+def _of_acceleration(runs: pd.DataFrame, acceleration: str, output: str) -> pd.Series:
+    """A load less what the opposed instants of an oscillation have in common; NaN where resistance is in it."""
+    cycle = runs["file"].astype(str) + "/" + runs["run_id"].astype(str).str.extract(r"^(.*)[+-]a$")[0]
+    opposed = cycle.notna() & (cycle.groupby(cycle).transform("size") == 2)
+    load = runs[output] - runs.groupby(cycle)[output].transform("mean").where(opposed, 0.0)
+    way = (acceleration == "udot") & (runs["U"].fillna(0.0) > 0.0) & ~opposed
+    return load.mask(way)
+
+
 @check("inertia_sign")
 def loads_along_acceleration(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
     """Acceleration tests whose load pushes along the acceleration."""
-    for file, acceleration, group, inertia in _apparent(evidence):
+    for file, acceleration, group, inertia in apparent_inertia(evidence):
         output = _ANSWERS[acceleration]
         single = group[(group[output] * group[acceleration] > 0.0) & (group["part"].nunique() == 1)]
         if inertia < 0.0:
@@ -229,7 +240,7 @@ def mass_in_the_loads(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
         return
     inertia = body.inertia or (math.nan,) * 3
     of_body = dict(zip(ACCELERATIONS, (*(body.mass,) * 3, *inertia), strict=True))
-    for file, acceleration, group, apparent in _apparent(evidence):
+    for file, acceleration, group, apparent in apparent_inertia(evidence):
         ratio = apparent / of_body[acceleration]
         if not ratio > rule.limits[acceleration[0]]:
             continue
@@ -293,6 +304,23 @@ def thrust_that_rises(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
             how = "more than at a lower J" if len(rises) else "against the torque that its thrust needs"
             what = f"{name} = {at[name]:.4g} at J = {at['J']:g} in run {at['run_id']}, {how}"
             yield rule.finding(str(file), [int(at["row"])], [name], what)
+
+
+@check("open_water")
+def one_advance(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
+    """Speed and revolutions beside the advance coefficient: J = U/(nD), whatever the size of the model."""
+    runs = evidence.runs
+    spun = runs[
+        (runs["test"] == "open_water") & (runs["n"].fillna(0.0) != 0.0) & runs["U"].notna() & (runs["J"] != 0.0)
+    ]
+    for file, group in spun.groupby("file", sort=False):
+        diameter = (group["U"] / group["n"] / group["J"]).to_numpy(float)
+        usual = float(np.median(diameter))
+        off = np.abs(diameter / usual - 1.0) > rule.limits["advance"]
+        if off.any():
+            at = group.iloc[int(off.argmax())]
+            what = f"U/(n J) is {diameter[off][0]:.4g} m at J = {at['J']:g}, the diameter in most rows {usual:.4g} m"
+            yield rule.finding(str(file), group["row"][off], ["J", "U", "n"], what)
 
 
 @check("open_water")

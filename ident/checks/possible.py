@@ -34,6 +34,14 @@ def states_of_a_boat(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
     yield from _beyond(runs, rule, "U", runs["U"], limits["speed"], "m/s at full scale")
     for name in ("p", "q", "r"):
         yield from _beyond(runs, rule, name, runs[name].abs() * length, limits["speed"], "m/s at the boat's length")
+    # A pure rotation has no way on, and a circle of no size; what moves across the hull is on no circle.
+    along = runs["U"] * np.cos(runs["alpha"].fillna(0.0)) * np.cos(runs["beta"].fillna(0.0))
+    tight = runs[["p", "q", "r"]].abs().max(axis=1) * length / runs["U"].where(along > 0.5 * runs["U"])
+    for file, group in runs[tight > limits["turn"]].groupby(together(runs[tight > limits["turn"]]), sort=False):
+        sizes = tight[group.index].to_numpy(float)
+        what = f"run {group['run_id'].iloc[int(sizes.argmax())]} turns on a radius of {1.0 / sizes.max():.2g} lengths; "
+        what += f"{len(group)} of the runs below {1.0 / limits['turn']:.2g}: the unit of the rate, or of the radius?"
+        yield rule.finding(str(file), rows_of(group), ["r"], what, "warning")
     for name in ACCELERATIONS:
         lever = 1.0 if name in ("udot", "vdot", "wdot") else length
         yield from _beyond(runs, rule, name, runs[name].abs() * lever, limits["acceleration"], "m/s^2")
