@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import contextlib
 import json
+import os
 import random
+from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
@@ -93,3 +95,16 @@ def test_a_file_of_before_the_seal_is_read(fitted_db, tmp_path):
     data["schema"] = 1
     path.write_text(json.dumps(data), "utf-8")
     assert import_exchange(path, str(tmp_path / "other"), 10.0)[0].digest == done["database"]["digest"]
+
+
+@pytest.mark.skipif(os.name != "posix", reason="pipes of POSIX")
+def test_what_has_no_end_or_no_bottom_is_no_exchange_file(tmp_path):
+    """A pipe, a device without an end, a file of a terabyte, lists in lists."""
+    os.mkfifo(tmp_path / "pipe.json")
+    with (tmp_path / "large.json").open("wb") as file:
+        file.truncate(1 << 40)
+    (tmp_path / "deep.json").write_text("[" * 100_000)
+    for path in (tmp_path / "pipe.json", Path("/dev/zero"), tmp_path / "large.json", tmp_path / "deep.json"):
+        with pytest.raises(InputError):
+            import_exchange(path, str(tmp_path / "other"), 1.0)
+    assert not (tmp_path / "other").exists()

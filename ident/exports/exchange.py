@@ -21,6 +21,8 @@ from sim.files.frames import PROGRAM
 FORMAT, SCHEMA = "ident exchange", 2
 # Files without a seal: read as far as the digests of their rows go.
 _UNSEALED = 1
+# Ten thousand rows of a version take 5 million bytes.
+_LARGEST = 1 << 28
 # What a commit says anew, and what belongs to the database that it stood in.
 _OF_THE_COMMIT = frozenset({"digest", "program", "vehicle", "time", "beside", "after", "seal", "parent"})
 _KINDS = {"double": "number", "int64": "integer", "string": "string"}
@@ -182,9 +184,13 @@ def import_exchange(path: Path, db: str, wait: float) -> list[Imported]:
 
 
 def _read(path: Path) -> dict[str, Any]:
+    if path.exists() and not path.is_file():
+        raise InputError(str(path), "a pipe, a device or a folder", "a file of `ident export --format json`")
     try:
+        if path.stat().st_size > _LARGEST:
+            raise InputError(str(path), f"{path.stat().st_size} bytes", f"{_LARGEST} bytes at most")
         data = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, ValueError) as error:
+    except (OSError, UnicodeDecodeError, ValueError, RecursionError) as error:
         raise InputError(str(path), f"cannot be read: {error}", "a file of `ident export --format json`") from error
     if not isinstance(data, dict) or data.get("format") != FORMAT or data.get("schema") not in (SCHEMA, _UNSEALED):
         raise InputError(str(path), "no exchange file of this program", f"format {FORMAT!r}, schema {SCHEMA}")
