@@ -22,7 +22,11 @@ from small_campaign import HEADER, RUNS, assert_refused, fitted, write
 
 from ident.captive.campaign import read_campaign
 from ident.checks.check import read_labels
+from ident.report.page import _errata
+from ident.report.score import read_score
+from sim.boat.vehicle import load_vehicle
 from sim.files.errors import InputError
+from sim.files.inputs import statements
 
 posix = pytest.mark.skipif(os.name != "posix", reason="pipes and links of POSIX")
 
@@ -64,6 +68,20 @@ def test_a_pipe_among_the_runs_is_refused_at_once(tmp_path):
         [sys.executable, "-c", script, str(folder)], capture_output=True, text=True, timeout=120, check=True
     )
     assert "a pipe or a device" in done.stdout
+
+
+@posix
+def test_a_pipe_in_the_place_of_a_file_of_statements_is_refused_at_once(tmp_path):
+    """Scoreboards, vehicles, cases and calibrations are read by one function."""
+    pipe = tmp_path / "board.json"
+    os.mkfifo(pipe)
+    with pytest.raises(InputError, match="a pipe or a device"):
+        statements(pipe)
+    with pytest.raises(InputError, match="a pipe or a device"):
+        read_score(pipe, "digest", 1)
+    suboff = load_vehicle("suboff").model_copy(update={"errata": str(pipe)})
+    with pytest.raises(InputError, match="a pipe or a device"):
+        _errata(suboff)
 
 
 @posix

@@ -31,6 +31,7 @@ from sim.boat.delta_log import Origin
 from sim.boat.mass import Environment
 from sim.boat.parts import vehicle_terms
 from sim.boat.vehicle import Vehicle, load_vehicle
+from sim.files import inputs
 from sim.files.errors import InputError
 from sim.files.frames import PROGRAM
 from sim.files.toml_files import bundled
@@ -147,6 +148,7 @@ def _errata(vehicle: Vehicle) -> list[dict[str, str]]:
     """
     if vehicle.errata is None:
         return []
+    inputs.check_regular(Path(vehicle.errata))
     try:
         with open(vehicle.errata, encoding="utf-8", newline="") as stream:
             table = csv.DictReader(stream)

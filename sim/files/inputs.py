@@ -45,6 +45,12 @@ def is_read(path: Path) -> bool:
     return Path(os.path.realpath(path)) in (_read.get() or ())
 
 
+def check_regular(path: Path) -> None:
+    """Refuse a pipe or a device, which may never end; what is not there, and a folder, is said where it is read."""
+    if path.exists() and not (path.is_file() or path.is_dir()):
+        raise InputError(str(path), "a pipe or a device", "a file that somebody wrote")
+
+
 def statements(path: Path) -> bytes:
     """Content of a file of statements, campaign, vehicle or case, which is noted as read.
 
@@ -55,6 +61,7 @@ def statements(path: Path) -> bytes:
     """
     note(path)
     try:
+        check_regular(path)
         size = path.stat().st_size
         if size > _LARGEST_STATEMENT:
             raise InputError(str(path), f"{size} bytes", f"a TOML file of {_LARGEST_STATEMENT} bytes at most")
