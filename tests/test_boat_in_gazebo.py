@@ -18,6 +18,7 @@ from ident.exports.gazebo_terms import terms_of
 from ident.identification.identify import identify
 from ident.validation.boats import Boat, Fleet
 from sim.boat.coefficients import Coefficients
+from sim.boat.delta_log import Version
 from sim.boat.mass import Environment, added_mass_matrix
 from sim.boat.vehicle import load_vehicle
 from sim.files.errors import InputError
@@ -64,7 +65,7 @@ def lauv(tmp_path_factory):
     """LAUV of its published coefficients: each monomial has a term but those of fins and propeller."""
     rows = database_rows(identify(read_campaign(ROOT / "raw_captive_data" / "lauv")))
     vehicle = load_vehicle("lauv")
-    boat = Boat(vehicle, rows, SimpleNamespace(number=0, digest="0" * 64), Coefficients(vehicle, rows))
+    boat = Boat(vehicle, rows, Version(0, "0", {"digest": "0" * 64}), Coefficients(vehicle, rows))
     path = tmp_path_factory.mktemp("gazebo") / "lauv.sdf"
     return boat, path, export_gazebo(boat, load_case("lauv-hzz10")[0], "coeff_db", path)
 

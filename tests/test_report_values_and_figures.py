@@ -21,6 +21,7 @@ from ident.cli import main
 from ident.database.store import commit
 from ident.database.versions import Database
 from ident.fitting.fit import fit
+from ident.report.coverage import coverage
 from ident.report.values import number, runs_of, term_anchor, term_pages
 from sim.boat.database import axis_columns, own_version, read_rows
 from sim.boat.parts import vehicle_terms
@@ -122,15 +123,13 @@ def test_a_difference_is_drawn_in_every_format(place, kind):
 
 def test_the_worst_of_words_with_one_factor_is_the_last_of_the_vocabulary():
     """Whatever the order of a set is in this process: the page of a version is the same every time."""
-    from ident.report.page import _coverage
-
     suboff = load_vehicle("suboff")
     term = vehicle_terms(suboff)[0]
     words = [f"word_{k}" for k in range(9)]
     shown = {"coefficient": term.name, "part": "hull", "origin": "published", "quality": words, "worst_residual": 0.0}
     rows = pd.DataFrame(shown | dict.fromkeys(axis_columns(), 0.0))
-    row = next(one for one in _coverage(suboff, rows, dict.fromkeys(words, 1.0)) if one["symbol"] == term.name)
-    assert (row["quality"], row["worst_points"]) == (words[-1], 1)
+    of_term = next(one for one in coverage(suboff, rows, dict.fromkeys(words, 1.0)) if one.symbol == term.name)
+    assert (of_term.quality, of_term.worst_points) == (words[-1], 1)
 
 
 def test_another_boats_version_is_no_parent(tmp_path):
