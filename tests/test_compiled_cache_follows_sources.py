@@ -51,10 +51,7 @@ def fill_rate(x):
 PROGRAM = "from sim.outer import fill_rate; print(fill_rate(1.0), sum(fill_rate.stats.cache_hits.values()))"
 
 
-@pytest.fixture
-def package(tmp_path):
-    """A package ``sim`` of two compiled files, one inlined into the other, with the real rule."""
-    folder = tmp_path / "sim"
+def _made(folder: Path) -> Path:
     folder.mkdir()
     for name in ("__init__.py", "compiled.py", "compiled_cache.py"):
         (folder / name).write_text((SIM / name).read_text("utf-8"), "utf-8")
@@ -63,6 +60,27 @@ def package(tmp_path):
     (folder / "outer.py").write_text(OUTER, "utf-8")
     (folder / "apart.py").write_text("NOTHING = 1\n", "utf-8")
     return folder
+
+
+@pytest.fixture
+def package(tmp_path):
+    """A package ``sim`` of two compiled files, one inlined into the other, with the real rule."""
+    return _made(tmp_path / "sim")
+
+
+@pytest.fixture(scope="module")
+def once_compiled(tmp_path_factory):
+    """The folder of such a package that has run once, with its home."""
+    folder = tmp_path_factory.mktemp("compiled")
+    run(_made(folder / "sim"))
+    return folder
+
+
+@pytest.fixture
+def compiled(once_compiled, tmp_path):
+    """A copy of that package, and of its home beside it."""
+    shutil.copytree(once_compiled, tmp_path / "copy")
+    return tmp_path / "copy" / "sim"
 
 
 def run(folder: Path, home: Path | None = None) -> tuple[list[str], str]:
@@ -112,14 +130,13 @@ def _share(path: Path) -> None:
 
 @pytest.mark.parametrize("harm", [_truncate, _garble, _share])
 @pytest.mark.parametrize("kind", [".nbc", ".nbi"])
-def test_a_damaged_or_foreign_file_is_compiled_again_and_replaced(package, harm, kind):
-    run(package)
-    harmed = [p for p in _kept(package) if p.suffix == kind]
+def test_a_damaged_or_foreign_file_is_compiled_again_and_replaced(compiled, harm, kind):
+    harmed = [p for p in _kept(compiled) if p.suffix == kind]
     assert harmed
     for path in harmed:
         harm(path)
-    assert run(package)[0] == ["1.0", "0"]
-    assert run(package)[0] == ["1.0", "1"]
+    assert run(compiled)[0] == ["1.0", "0"]
+    assert run(compiled)[0] == ["1.0", "1"]
 
 
 def test_what_another_user_owns_or_could_write_is_not_ours(tmp_path, monkeypatch):
