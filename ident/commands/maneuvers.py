@@ -228,7 +228,8 @@ def _histories(done: list[Validation], out: Path, kind: str, console: Any) -> No
 def _figures(asked: ValidateOptions) -> Iterator[Drawn]:
     from ident.validation.figure_files import figures_of_many, figures_of_one
 
-    if asked.every:
+    if asked.every or asked.samples:
+        # Samples are too many to hand to another process.
         yield partial(figures_of_many, asked.out, asked.figures)
         return
     with figures_of_one(asked.out, asked.figures) as drawn:
