@@ -42,6 +42,20 @@ def test_bundled_file_given_as_own_gives_the_bundled_errors(tmp_path, fitted_db)
     assert own["references"]["CFD"]["x"]["ratio"] > 0.0
 
 
+def test_a_time_of_another_size_is_refused_with_its_channel(tmp_path, fitted_db):
+    """A last sample after thirty years: no smooth path goes through it."""
+
+    def late(table):
+        rolled = (table["source"] == "EXP") & (table["channel"] == "phi")
+        last = table.index == table[rolled].index[-1]
+        return table.assign(t=table["t"].where(~last, 1e9))
+
+    with pytest.raises(InputError) as refused:
+        validate("roll-decay", fitted_db, reference=_own(tmp_path / "mine.csv", "roll_decay.csv", late))
+    assert refused.value.where.endswith("mine.csv, EXP phi")
+    assert "to 1e+09 s" in refused.value.found
+
+
 def test_frame_option_turns_the_file(tmp_path, fitted_db):
     """The same track written x forward, z down, with --frame program; x changes sign only."""
 

@@ -338,12 +338,28 @@ def _driven(case: Case, trial: Trial) -> tuple[Case | None, list[str]]:
     return begun.model_copy(update={"command": case.command.model_copy(update=update)}), said
 
 
-def smoothed(series: Series) -> Series:
-    """Series whose noisy channels have a smooth path that metrics are measured on; others are as they are."""
+def smoothed(series: Series, where: str) -> Series:
+    """Series whose noisy channels have a smooth path that metrics are measured on; others are as they are.
+
+    Raises
+    ------
+    InputError
+        Naming the channel of ``where`` through which there is none: a time or value of another size than the others.
+    """
     if series.abscissa != "t":
         return series
     for source, channels in series.data.items():
-        smooth = {name: path for name, record in channels.items() if (path := _if_noisy(record)) is not None}
+        smooth = {}
+        for name, record in channels.items():
+            try:
+                path = _if_noisy(record)
+            except np.linalg.LinAlgError as error:
+                ends = f"times from {record.abscissa[0]:g} to {record.abscissa[-1]:g} s"
+                found = f"no smooth path through it, {ends}: {error}"
+                remedy = "times that are even, and values of one size: look at the clock and the units"
+                raise InputError(f"{where}, {source} {name}", found, remedy) from error
+            if path is not None:
+                smooth[name] = path
         if smooth:
             series.smooth[source] = channels | smooth
     return series

@@ -206,7 +206,7 @@ def _with_reference(case: Case, record: OwnReference) -> Referenced:
         frame=declared,
         initial={k: v for k, v in (case.reference.initial if case.reference else {}).items() if k in compare},
     )
-    return Referenced(case.model_copy(update={"reference": reference, "tolerance": []}), smoothed(series))
+    return Referenced(case.model_copy(update={"reference": reference, "tolerance": []}), smoothed(series, str(path)))
 
 
 @gathered(
