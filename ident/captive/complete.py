@@ -60,20 +60,22 @@ def check_parts(folder: Path, runs: pd.DataFrame, vehicle: Vehicle) -> None:
         for test in term.tests:
             parts.setdefault(test, set()).update(parts_of(term, vehicle))
     sections = {s.name for s in vehicle.sections.centres} if vehicle.sections else set()
-    for (of_test, part), group in runs.groupby(["test", "part"], sort=False):
-        test = str(of_test)
-        place = f"{folder / group['file'].iloc[0]}, row {group['row'].iloc[0]}, column "
-        if test != PUBLISHED and part not in parts.get(test, {part}):
-            of_test_runs = runs[(runs["test"] == test) & runs["part"].isin(parts[test])]
-            alone = group[~group["file"].isin(of_test_runs["file"])]
-            if not alone.empty:
-                place = f"{folder / alone['file'].iloc[0]}, row {alone['row'].iloc[0]}, column "
-                text = f"{', '.join(sorted(parts[test]))}: no coefficient of another part is identified by {test} runs"
-                raise InputError(place + "part", f"{part!r}, and its loads would be left out", text)
+
+    def at(group: pd.DataFrame, column: str) -> str:
+        return f"{folder / group['file'].iloc[0]}, row {group['row'].iloc[0]}, column {column}"
+
+    for key, group in runs.groupby(["test", "part"], sort=False):
+        test, part = map(str, key)
+        useful = parts.get(test, {part}) if test != PUBLISHED else {part}
+        beside = runs.loc[(runs["test"] == test) & runs["part"].isin(useful), "file"]
+        alone = group[~group["file"].isin(beside)]
+        if not alone.empty:
+            text = f"{', '.join(sorted(useful))}: no coefficient of another part is identified by {test} runs"
+            raise InputError(at(alone, "part"), f"{part!r}, and its loads would be left out", text)
         for lever in ("x", "y", "z"):
             if part not in sections and lever in group and group[lever].notna().any():
                 text = "nothing: levers are those of the vehicle file's sections, which alone are compared"
-                raise InputError(place + lever, f"{group[lever].dropna().iloc[0]:g}, declared and unused", text)
+                raise InputError(at(group, lever), f"{group[lever].dropna().iloc[0]:g}, declared and unused", text)
 
 
 def _doubtful(runs: pd.DataFrame) -> np.ndarray:

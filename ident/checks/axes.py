@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 
 from ident.checks.findings import (
+    HULL,
     Body,
     Evidence,
     Finding,
@@ -25,11 +26,10 @@ from sim.boat.catalogue import ACCELERATIONS
 
 _PLANES = {"drift_horizontal": ("beta", "Y", "N"), "drift_vertical": ("alpha", "Z", "M")}
 _MOVING = ("p", "q", "r", *ACCELERATIONS)
-_HULL = ("hull", "")
 
 
 def _still(runs: pd.DataFrame) -> pd.Series:
-    return (runs[list(_MOVING)].fillna(0.0) == 0.0).all(axis=1) & runs["part"].isin(_HULL)
+    return (runs[list(_MOVING)].fillna(0.0) == 0.0).all(axis=1) & runs["part"].isin(HULL)
 
 
 @check("flow_axes")
@@ -65,7 +65,7 @@ def weight_in_the_loads(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
     if body is None or body.mass is None:
         return
     weight = body.mass * rule.limits["gravity"]
-    hull = evidence.runs["part"].isin(_HULL)
+    hull = evidence.runs["part"].isin(HULL)
     # What the two sides of an oscillation have in common stands still in it.
     swung = hull & evidence.runs["run_id"].astype(str).str.contains(r"[+-][av]$")
     runs = evidence.runs[(_still(evidence.runs) | swung) & kept(evidence.runs, "Z")]
@@ -84,7 +84,7 @@ def thrust_in_x(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
     """X of hull runs with revolutions, from which no thrust was taken off."""
     runs = evidence.runs
     taken = runs["taken_X"].notna() if "taken_X" in runs else pd.Series(False, index=runs.index)
-    pushed = runs[(runs["part"].isin(_HULL)) & (runs["n"].fillna(0.0) != 0.0) & ~taken & kept(runs, "X")]
+    pushed = runs[(runs["part"].isin(HULL)) & (runs["n"].fillna(0.0) != 0.0) & ~taken & kept(runs, "X")]
     for file, group in pushed.groupby(together(pushed), sort=False):
         what = f"X of {len(group)} hull runs with the propeller at {group['n'].min():g} to {group['n'].max():g} rev/s"
         yield rule.finding(str(file), rows_of(group), ["X", "n"], what)
@@ -95,7 +95,7 @@ def revolutions_beside_other_loads(evidence: Evidence, rule: Rule) -> Iterator[F
     """Other loads with revolutions: no coefficient depends on them, so what the propeller does is in the loads."""
     runs = evidence.runs
     turning = runs[(runs["n"].fillna(0.0) != 0.0) & ~runs["test"].isin(["open_water", "self_propulsion"])]
-    turning = turning[~(turning["part"].isin(_HULL) & kept(turning, "X"))]
+    turning = turning[~(turning["part"].isin(HULL) & kept(turning, "X"))]
     for file, group in turning.groupby(together(turning), sort=False):
         what = f"loads of {len(group)} runs with the propeller at {group['n'].min():g} to {group['n'].max():g} rev/s, "
         what += "on which no coefficient of theirs depends: what the propeller does to them is in them"
@@ -109,7 +109,7 @@ def _groups(evidence: Evidence, test: str, angle: str) -> Iterator[tuple[str, pd
     """Runs that give a load at an angle and nothing else, by how they were made: (words, runs)."""
     runs = evidence.runs
     rest = [m for m in ("p", "q", "r") if m in runs]
-    still = (runs[rest].fillna(0.0) == 0.0).all(axis=1) & runs["part"].isin(_HULL)
+    still = (runs[rest].fillna(0.0) == 0.0).all(axis=1) & runs["part"].isin(HULL)
     steady = still & _still(runs) & (runs["test"] == test)
     phases = runs["run_id"].astype(str).str.extract(r"^(?P<cycle>.*)(?P<phase>[+-][av])$")
     swung = phases["phase"].notna()

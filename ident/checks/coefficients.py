@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pandas as pd
 
-from ident.checks.findings import Evidence, Finding, Rule, check
+from ident.checks.findings import Evidence, Finding, Rule, check, printed_place
 from sim.boat.parts import vehicle_terms
 
 if TYPE_CHECKING:
@@ -55,18 +55,9 @@ def values_a_boat_may_have(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
         # What is left of the resistance beside a thrust says nothing.
         if (low - slack <= value <= high + slack) or (thrust and name.startswith("X_")):
             continue
-        place = _place(runs, name, part)
+        place = printed_place(runs, [name], part)
         what = f"{name} ({part}) = {value:.4g} +- {error:.2g}, boats and ships have {low:g} to {high:g}: {basis}"
         yield rule.finding(place[0], place[1], ["value"] if place[1] else [name], what)
-
-
-def _place(runs: pd.DataFrame, name: str, part: str) -> tuple[str, list[int]]:
-    """File and row of a published value; of an identified one no file."""
-    if "coefficient" in runs:
-        printed = runs[(runs["coefficient"] == name) & (runs["part"] == part)]
-        if not printed.empty:
-            return str(printed["file"].iloc[0]), [int(r) for r in printed["row"]]
-    return "identified coefficients", []
 
 
 @check("fluid")

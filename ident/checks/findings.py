@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 SEVERITIES = ("info", "warning", "error")
+# Part of a run of the whole hull, named or not.
+HULL = ("hull", "")
 
 
 @dataclass(frozen=True)
@@ -217,6 +219,15 @@ def together(runs: pd.DataFrame) -> pd.Series:
 def rows_of(group: pd.DataFrame) -> list[int]:
     """Rows of runs that stand in one file; none where each has a file of its own."""
     return [int(r) for r in group["row"]] if group["file"].nunique() == 1 else []
+
+
+def printed_place(runs: pd.DataFrame, names: Sequence[str], part: str = "") -> tuple[str, list[int]]:
+    """File and rows of published values, of a part alone where it is named; of identified ones no rows."""
+    printed = runs[runs["coefficient"].isin(names)] if "coefficient" in runs else runs.iloc[:0]
+    printed = printed[printed["part"] == part] if part else printed
+    if printed["file"].nunique() != 1:
+        return "identified coefficients", []
+    return str(printed["file"].iloc[0]), rows_of(printed)
 
 
 def dynamic(runs: pd.DataFrame, body: Body) -> pd.Series:

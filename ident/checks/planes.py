@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ident.checks.findings import Evidence, Finding, Rule, check, kept, rows_of, together
+from ident.checks.findings import Evidence, Finding, Rule, check, kept, printed_place, rows_of, together
 from sim.boat.parts import vehicle_terms
 from sim.boat.vehicle import Vehicle
 
@@ -43,7 +43,7 @@ def published_and_constant_planes(evidence: Evidence, rule: Rule) -> Iterator[Fi
                 towards = f"{'-' if way < 0 else '+'}{output}"
                 what = f"{name} = {value:.4g}, and a deflected {plane.name} lifts towards {towards} "
                 what += "(span_axis and leading_edge of the vehicle)"
-                yield rule.finding(*_place(evidence, name), ["value"], what)
+                yield rule.finding(*printed_place(evidence.runs, [name]), ["value"], what)
         for moment, (force, sense) in _LEVERS.items():
             name, value, _ = slopes.get((plane.name, moment), ("", 0.0, 0.0))
             of_force, lift, _ = slopes.get((plane.name, force), ("", 0.0, 0.0))
@@ -53,16 +53,7 @@ def published_and_constant_planes(evidence: Evidence, rule: Rule) -> Iterator[Fi
             if abs(lever - place) > rule.limits["share"]:
                 what = f"{name} = {value:.4g} with {of_force} = {lift:.4g}: a lever of {lever:.2f} L, "
                 what += f"and {plane.name} is at {place:.2f} L"
-                yield rule.finding(*_place(evidence, name), ["value"], what)
-
-
-def _place(evidence: Evidence, name: str) -> tuple[str, list[int]]:
-    """File and row of a published value; of an identified one no file."""
-    runs = evidence.runs
-    printed = runs[runs["coefficient"] == name] if "coefficient" in runs else runs.iloc[:0]
-    if printed.empty:
-        return "identified coefficients", []
-    return str(printed["file"].iloc[0]), [int(r) for r in printed["row"]]
+                yield rule.finding(*printed_place(evidence.runs, [name]), ["value"], what)
 
 
 @check("plane_sign")

@@ -9,13 +9,12 @@ from itertools import combinations
 import numpy as np
 import pandas as pd
 
-from ident.checks.findings import Body, Evidence, Finding, Rule, check, kept, rows_of, together
+from ident.checks.findings import HULL, Body, Evidence, Finding, Rule, check, kept, printed_place, rows_of, together
 from ident.checks.physics import apparent_inertia, slope
 from sim.boat.catalogue import ACCELERATIONS, OUTPUTS
 from sim.boat.parts import vehicle_terms
 from sim.hull.slender import spheroid
 
-_HULL = ("hull", "")
 # An angle of flow below this is none [rad].
 _STRAIGHT = math.radians(0.5)
 # Test, angle, force, moment, sense in which the Munk moment turns the bow away from the flow; added mass across.
@@ -73,7 +72,7 @@ def _slopes(
     """File, rows, and slopes of force and moment over an angle: of the runs of each file, and as published."""
     body, runs = evidence.body, evidence.runs
     assert body is not None
-    of_test = runs[(runs["test"] == test) & runs["part"].isin(_HULL)]
+    of_test = runs[(runs["test"] == test) & runs["part"].isin(HULL)]
     for file, group in of_test.groupby(together(of_test), sort=False):
         lift, turn = slope(group, angle, force, body), slope(group, angle, moment, body)
         if math.isfinite(lift) and math.isfinite(turn):
@@ -91,7 +90,7 @@ def _constants(evidence: Evidence) -> dict[str, tuple[float, float]]:
     assert evidence.vehicle is not None
     norms = {t.name: t.norm for t in vehicle_terms(evidence.vehicle)}
     table = evidence.constants
-    table = table[table["part"].isin(_HULL) & table["coefficient"].map(norms).eq("rho/2 L")]
+    table = table[table["part"].isin(HULL) & table["coefficient"].map(norms).eq("rho/2 L")]
     return {
         str(n): (float(v), float(e))
         for n, v, e in zip(table["coefficient"], table["value"], table["stderr"], strict=True)
@@ -116,16 +115,7 @@ def added_inertia_both_ways(evidence: Evidence, rule: Rule) -> Iterator[Finding]
         if abs(one - other) <= max(allowed, rule.limits["errors"] * math.hypot(s_one, s_other)):
             continue
         what = f"{pair[0]} = {one:.3g} and {pair[1]} = {other:.3g}, which are one number about one point"
-        rows, file = _places(evidence.runs, pair)
-        yield rule.finding(file, rows, pair, what)
-
-
-def _places(runs: pd.DataFrame, names: list[str]) -> tuple[list[int], str]:
-    """Rows and file of published values; of identified ones no rows."""
-    printed = runs[runs["coefficient"].isin(names)] if "coefficient" in runs else runs.iloc[:0]
-    if printed.empty or printed["file"].nunique() != 1:
-        return [], "identified coefficients"
-    return [int(r) for r in printed["row"]], str(printed["file"].iloc[0])
+        yield rule.finding(*printed_place(evidence.runs, pair), pair, what)
 
 
 @check("turning")
@@ -143,8 +133,7 @@ def turns_pushed_at_the_stern(evidence: Evidence, rule: Rule) -> Iterator[Findin
         if sense * value < -max(rule.limits["share"] * abs(known[lift][0]), rule.limits["errors"] * error):
             what = f"{turn} = {value:.3g} with {lift} = {known[lift][0]:.3g}: the load of the turn would act ahead of "
             what += "the moment point, where a hull and its stern planes have it behind"
-            rows, file = _places(evidence.runs, [turn])
-            yield rule.finding(file, rows, [turn], what)
+            yield rule.finding(*printed_place(evidence.runs, [turn]), [turn], what)
 
 
 def _over_a_rate(runs: pd.DataFrame, rate: str, output: str, body: Body) -> Iterator[tuple[str, list[int], float]]:
@@ -152,7 +141,7 @@ def _over_a_rate(runs: pd.DataFrame, rate: str, output: str, body: Body) -> Iter
     others = [r for r in "pqr" if r != rate]
     straight = (runs[["alpha", "beta"]].fillna(0.0).abs() < _STRAIGHT).all(axis=1)
     alone = (runs[[*others, *ACCELERATIONS]].fillna(0.0) == 0.0).all(axis=1) & (runs[rate].fillna(0.0) != 0.0)
-    chosen = runs[straight & alone & runs["part"].isin(_HULL) & kept(runs, output) & (runs["U"] > 0.0)]
+    chosen = runs[straight & alone & runs["part"].isin(HULL) & kept(runs, output) & (runs["U"] > 0.0)]
     for file, group in chosen.groupby(together(chosen), sort=False):
         x = (group[rate] * body.length / group["U"]).to_numpy(float)
         size = 0.5 * body.density * body.length ** (2 if output in "XYZ" else 3) * group["U"].to_numpy(float) ** 2
@@ -175,7 +164,7 @@ def turns_of_tabulated_boats(evidence: Evidence, rule: Rule) -> Iterator[Finding
                 what = f"{output} over {rate} is {found:.3g} (prime form): it drives the turn on, as no water does"
                 yield rule.finding(file, rows, [output, rate], what, "error")
     for (test, angle, force, *_), rate, sense in zip(_PLANES, "rq", (1.0, -1.0), strict=True):
-        of_test = evidence.runs[(evidence.runs["test"] == test) & evidence.runs["part"].isin(_HULL)]
+        of_test = evidence.runs[(evidence.runs["test"] == test) & evidence.runs["part"].isin(HULL)]
         lift = slope(of_test, angle, force, body)
         for file, rows, found in _over_a_rate(evidence.runs, rate, force, body):
             if sense * found < -rule.limits["share"] * abs(lift):

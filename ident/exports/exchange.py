@@ -17,6 +17,7 @@ from ident.output import file_at, whole
 from sim.boat.database import Version, axis_columns, column_order, column_type, digest, last_own, read_rows, versions
 from sim.files.errors import InputError
 from sim.files.frames import PROGRAM
+from sim.files.inputs import check_regular
 
 FORMAT, SCHEMA = "ident exchange", 2
 # Files without a seal: read as far as the digests of their rows go.
@@ -184,8 +185,7 @@ def import_exchange(path: Path, db: str, wait: float) -> list[Imported]:
 
 
 def _read(path: Path) -> dict[str, Any]:
-    if path.exists() and not path.is_file():
-        raise InputError(str(path), "a pipe, a device or a folder", "a file of `ident export --format json`")
+    check_regular(path)
     try:
         if path.stat().st_size > _LARGEST:
             raise InputError(str(path), f"{path.stat().st_size} bytes", f"{_LARGEST} bytes at most")

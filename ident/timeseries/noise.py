@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ident.timeseries.splines import (
+    HOPELESS,
     ORDER,
     added,
     basis,
@@ -31,8 +32,6 @@ from ident.timeseries.splines import (
 Array = NDArray[np.float64]
 # Decades of the smoothing parameter that are searched, about the one of a unit response.
 _DECADES = (-9.0, 13.0)
-# Loss where a system cannot be solved: infinity would leave the minimiser without a number.
-_HOPELESS = 1e30
 # The first memory that is tried, in steps of the record, and the longest: a share of the record, beyond which noise
 # cannot be told from motion.
 _FIRST, _LONGEST = 0.5, 1.0 / 50.0
@@ -123,30 +122,31 @@ def likely(time: Array, value: Array, memory: float | None = 0.0) -> Likely:
     scale = float(np.std(value)) or 1.0
     unit = Samples(time, (value - value.mean()) / scale, 0, 1.0, memory or 0.0)
     knots = knots_for(time)
-    at, best = memory or 0.0, _best(knots, unit)
+    of_path = basis(knots, time, 0)
+    at, best = memory or 0.0, _best(knots, of_path, unit)
     if memory is None:
-        at, best = _doubled(knots, unit, best)
+        at, best = _doubled(knots, of_path, unit, best)
         if at:
             middle = best.decade
             found = minimize_scalar(
-                lambda x: _best(knots, replace(unit, memory=math.exp(x)), middle).loss,
+                lambda x: _best(knots, of_path, replace(unit, memory=math.exp(x)), middle).loss,
                 bounds=(math.log(at / 2.0), math.log(at * 2.0)),
                 method="bounded",
                 options={"xatol": 0.05},
             )
             at = math.exp(float(found.x))
-            best = _best(knots, replace(unit, memory=at), middle)
+            best = _best(knots, of_path, replace(unit, memory=at), middle)
     sigma = scale * math.sqrt(best.left / (time.size - ORDER))
     weight = step_of(knots) ** (2 * ORDER - 1) * 10.0**best.decade
     return Likely(sigma**2 / weight, sigma, at)
 
 
-def _doubled(knots: Array, unit: Samples, white: _Fit) -> tuple[float, _Fit]:
+def _doubled(knots: Array, of_path: Any, unit: Samples, white: _Fit) -> tuple[float, _Fit]:
     """The likeliest of memories that are doubled as long as that helps, and its fit."""
     steps = float(np.median(np.diff(unit.time)))
     best, at, memory, near = white, 0.0, _FIRST * steps, white.decade
     while memory <= _LONGEST * float(unit.time[-1] - unit.time[0]):
-        one = _best(knots, replace(unit, memory=memory), near)
+        one = _best(knots, of_path, replace(unit, memory=memory), near)
         if one.loss < best.loss:
             best, at = one, memory
         elif memory > 2.0 * at:
@@ -155,21 +155,25 @@ def _doubled(knots: Array, unit: Samples, white: _Fit) -> tuple[float, _Fit]:
     return at, best
 
 
-def _best(knots: Array, unit: Samples, near: float | None = None) -> _Fit:
-    """The likeliest smoothing parameter, as a decade of the one of a unit response; near another, or anywhere."""
+def _best(knots: Array, of_path: Any, unit: Samples, near: float | None = None) -> _Fit:
+    """The likeliest smoothing parameter, as a decade of the one of a unit response; near another, or anywhere.
+
+    ``of_path`` is the basis at the samples, which does not change with their memory; their size is one.
+    """
     from scipy.optimize import minimize_scalar
 
-    left_side, right_side = equations(knots, unit)
+    white, shrunk = whitening(unit)
+    left_side, right_side = white @ of_path, white @ unit.value
     bands, right, penalty = gram(left_side), left_side.T @ right_side, penalty_of(knots)
     free, rank = unit.time.size - ORDER, right.size - ORDER
-    size, shrunk = step_of(knots) ** (2 * ORDER - 1), whitening(unit)[1]
+    size = step_of(knots) ** (2 * ORDER - 1)
 
     def fitted(decade: float) -> _Fit:
         weight = size * 10.0**decade
         try:
             factor, solved = solve(added(bands, weight * penalty), right)
         except np.linalg.LinAlgError:
-            return _Fit(decade, _HOPELESS, 0.0)
+            return _Fit(decade, HOPELESS, 0.0)
         # Residuals and roughness by themselves: their sum as a difference would be lost in rounding.
         left = float(np.sum((right_side - left_side @ solved) ** 2)) + weight * roughness(knots, solved)
         left = max(left, 1e-28 * unit.time.size)

@@ -19,15 +19,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ident.timeseries.noise import Samples, equations, likely
-from ident.timeseries.splines import DEGREE, ORDER, added, gram, knots_for, log_det, penalty_of, roughness, solve
+from ident.timeseries.splines import (
+    DEGREE,
+    HOPELESS,
+    ORDER,
+    added,
+    gram,
+    knots_for,
+    log_det,
+    penalty_of,
+    roughness,
+    solve,
+)
 
 Array = NDArray[np.float64]
 # A rudder that begins to move makes the third derivative jump. The density is taken this much larger than the
 # likeliest one: the bias of a cubic kink falls with its root, to a third, and standard errors grow with its
 # twelfth root, by a fifth (Hall 1992, Annals of Statistics 20:675-694, on undersmoothing for intervals).
 _ROUGHER = 10.0
-# Loss where a system cannot be solved: infinity would leave the minimiser without a number.
-_HOPELESS = 1e30
 
 
 @dataclass(frozen=True)
@@ -161,7 +170,7 @@ def _density(knots: Array, sides: list[tuple[Any, Array]], bands: Array, right: 
         try:
             factor, solved = solve(added(bands, weight * penalty), right)
         except np.linalg.LinAlgError:
-            return _HOPELESS
+            return HOPELESS
         left = sum(float(np.sum((value - side @ solved) ** 2)) for side, value in sides)
         return left + weight * roughness(knots, solved) + log_det(factor) - rank * math.log(weight)
 

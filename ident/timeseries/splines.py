@@ -14,6 +14,8 @@ ORDER = 3
 _THIRD = (-1.0, 3.0, -3.0, 1.0)
 # Knots of a path; finer than any maneuver of a boat asks for.
 _MOST_KNOTS = 1600
+# Loss where a system cannot be solved: infinity would leave a minimiser without a number.
+HOPELESS = 1e30
 
 
 def penalty_of(knots: Array) -> Array:

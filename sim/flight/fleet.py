@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -21,36 +22,35 @@ from sim.waves.shared import kept_size, put_in, take_out
 Array = NDArray[np.float64]
 
 
+class Boats(NamedTuple):
+    """What each boat of a fleet has of its own: (n, ...) commands, state, controls, sums and phases of waves, time."""
+
+    f: Array
+    y: Array
+    c: Array
+    kept: Array
+    phases: Array
+    time: Array
+
+
 @outer
 def hold_each(
-    v: maneuver.Flight,
-    around: Around,
-    f: np.ndarray,
-    y: np.ndarray,
-    c: np.ndarray,
-    kept: np.ndarray,
-    phases: np.ndarray,
-    time: np.ndarray,
-    rate: np.ndarray,
-    dt: float,
-    steps: int,
-    first: int,
-    last: int,
+    v: maneuver.Flight, around: Around, boats: Boats, rate: Array, dt: float, steps: int, first: int, last: int
 ) -> None:
     """``sim.flight.maneuver.hold`` for boats ``first`` to ``last``.
 
     Parameters
     ----------
-    v, around : Of the thread. f, y, c, kept, phases, time : (n, ...) of the boats; one whose state has left the finite
-        numbers is left alone.
+    v, around, rate : Of the thread.
+    boats : One whose state has left the finite numbers is left alone.
     """
     for i in range(first, last):
-        if not np.isfinite(y[i]).all():
+        if not np.isfinite(boats.y[i]).all():
             continue
-        put_in(around, kept[i], phases[i])
-        one = maneuver.Flight(v.m, v.w, v.g, v.q, f[i], v.j, y[i], c[i], v.s, v.k, v.stage)
-        time[i] = maneuver.hold(one, around, rate, dt, steps, time[i])
-        take_out(around, kept[i])
+        put_in(around, boats.kept[i], boats.phases[i])
+        one = maneuver.Flight(v.m, v.w, v.g, v.q, boats.f[i], v.j, boats.y[i], boats.c[i], v.s, v.k, v.stage)
+        boats.time[i] = maneuver.hold(one, around, rate, dt, steps, boats.time[i])
+        take_out(around, boats.kept[i])
 
 
 @dataclass(frozen=True)
@@ -160,5 +160,5 @@ class FleetPlant:
         return self.state
 
     def _move(self, steps: int, desk: _Desk, first: int, last: int) -> None:
-        boats = (self._given, self.state, self.controls, self._kept, self.phases, self.time)
-        hold_each(desk.flight, desk.around, *boats, desk.rate, self.dt, steps, int(first), int(last))
+        boats = Boats(self._given, self.state, self.controls, self._kept, self.phases, self.time)
+        hold_each(desk.flight, desk.around, boats, desk.rate, self.dt, steps, int(first), int(last))

@@ -28,8 +28,6 @@ Whole = NDArray[np.int64]
 # Surroundings of ``sim.waves.surroundings``, or an empty tuple in deep, calm water.
 Around: TypeAlias = Any
 
-# Places in a state.
-
 # Rules beyond the nodes of an axis.
 HOLD, LINEAR, LINEAR_LOAD = 0, 1, 2
 

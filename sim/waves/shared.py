@@ -10,21 +10,22 @@ import numpy as np
 from numba.extending import overload
 from numpy.typing import NDArray
 
+from sim.boat.state import N_STATES
 from sim.waves.surroundings import VALUES, WIDTH, Around
 
 Array = NDArray[np.float64]
 
 # Quantities now, then values and slopes before and after, stand one behind the other.
 _SETS = 5
-# Of a passage: predicted state and velocities before.
-_STATE, _BEFORE = 12, 6
+# Of a passage, beside the predicted state: velocities before.
+_BEFORE = 6
 
 
 def kept_size(around: Around) -> int:
     """How many numbers a boat keeps of its surroundings; none in deep, calm water."""
     if not len(around):
         return 0
-    return VALUES + _SETS * int(around.near.b[WIDTH]) + _STATE + _BEFORE
+    return VALUES + _SETS * int(around.near.b[WIDTH]) + N_STATES + _BEFORE
 
 
 def put_in(around: Around, kept: Array, phases: Array) -> None:
@@ -34,26 +35,26 @@ def put_in(around: Around, kept: Array, phases: Array) -> None:
     ----------
     kept : (``kept_size``,) what ``take_out`` left. phases : Of the wave components [rad].
     """
-    a, sums, size = around.near.a, around.sums, kept.size - _STATE - _BEFORE
+    a, sums, size = around.near.a, around.sums, kept.size - N_STATES - _BEFORE
     for i in range(size):
         a[i] = kept[i]
-    for i in range(_STATE):
+    for i in range(N_STATES):
         sums.state[i] = kept[size + i]
     for i in range(_BEFORE):
-        sums.before[i] = kept[size + _STATE + i]
+        sums.before[i] = kept[size + N_STATES + i]
     for i in range(phases.size):
         around.sea.waves.phase[i] = phases[i]
 
 
 def take_out(around: Around, kept: Array) -> None:
     """Keep what a boat has of its own in the surroundings."""
-    a, sums, size = around.near.a, around.sums, kept.size - _STATE - _BEFORE
+    a, sums, size = around.near.a, around.sums, kept.size - N_STATES - _BEFORE
     for i in range(size):
         kept[i] = a[i]
-    for i in range(_STATE):
+    for i in range(N_STATES):
         kept[size + i] = sums.state[i]
     for i in range(_BEFORE):
-        kept[size + _STATE + i] = sums.before[i]
+        kept[size + N_STATES + i] = sums.before[i]
 
 
 def _calm_put_in(around: Around, kept: Array, phases: Array) -> None:

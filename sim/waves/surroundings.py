@@ -170,7 +170,7 @@ def read_gauge(around: Around, state: Array, rate: Array) -> None:
     if around.near.b[WAVES]:
         head, change = wave_passage.gauge(around.sea, around.sums, around.near.a[NOW])
         state[Z] += head
-        rate[8] += change
+        rate[Z] += change
 
 
 def near_of(around: Around) -> Around:

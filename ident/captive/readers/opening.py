@@ -18,6 +18,7 @@ from ident.captive.readers.text import COMMENTS, Lines, head, opened, sniff
 from ident.captive.readers.universal import open_universal
 from ident.captive.source import Source
 from sim.files.errors import InputError
+from sim.files.inputs import check_regular
 
 _LOADS = ("forces", "movingForces", "force", "moment")
 _OUTPUTS = {"forces.dat", "movingForces.dat", "force.dat", "moment.dat", "coefficient.dat", "forceCoeffs.dat"}
@@ -108,9 +109,7 @@ def reader_of(path: Path, source: Source) -> str:
     their first bytes, Fluent, SU2 and Tecplot files in their first lines; ``Monitor`` in the header
     is STAR-CCM+; a header with ``;``, a tab or ``,`` is a table; the rest are columns.
     """
-    if path.exists() and not (path.is_file() or path.is_dir()):
-        # Opening it would wait for who writes to it.
-        raise InputError(str(path), "a pipe or a device", "a file")
+    check_regular(path)
     if source.reader:
         return source.reader
     if path.is_dir():
