@@ -41,6 +41,11 @@ def _same(one, other):
         assert np.array_equal(values, other.channels[channel], equal_nan=True), channel
 
 
+def _assert_same_flight(one, other):
+    """As docs/integration.md states it of steps with two stages."""
+    assert np.sqrt(np.mean((one - other) ** 2)) < 1e-4 * np.ptp(other)
+
+
 @pytest.mark.parametrize(("workers", "chunk"), [(1, 9), (2, 2), (5, 4)])
 def test_bands_do_not_depend_on_workers_or_chunks(case, campaign, rows, alone, workers, chunk):
     done = []
@@ -69,7 +74,7 @@ def test_sample_of_the_batch_is_the_single_run_of_its_coefficients(case, campaig
     ]
     single = simulate(case, Coefficients(campaign.vehicle, rows.assign(value=values)))
     for channel in ("psi", "u", "r", "phi", "z"):
-        assert alone.channels[channel][3] == pytest.approx(single[channel], rel=1e-9, abs=1e-9)
+        _assert_same_flight(alone.channels[channel][3], single[channel])
 
 
 @pytest.mark.parametrize("name", ["hzz20", "self-propulsion"])
@@ -91,9 +96,8 @@ def test_flights_from_a_sources_own_start_are_part_of_the_batch(case, campaign, 
     reference = case.reference.model_copy(update={"initial": {"EXP": start}})
     own = case.model_copy(update={"reference": reference})
     bands = fly_samples(own, campaign.vehicle, rows.assign(stderr=0.0), 2)
-    assert bands.as_started["EXP"]["u"][0] == pytest.approx(
-        simulate(own.started_as("EXP"), Coefficients(campaign.vehicle, rows))["u"], rel=1e-9
-    )
+    single = simulate(own.started_as("EXP"), Coefficients(campaign.vehicle, rows))
+    _assert_same_flight(bands.as_started["EXP"]["u"][0], single["u"])
     assert bands.as_started["EXP"]["U"][:, 0] == pytest.approx([4.0, 4.0])
     assert bands.channels["U"][:, 0] == pytest.approx(np.full(2, own.initial.speed_mps))
 

@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from ident.validation.band_summary import inside, variance_shares
 from ident.validation.bands import Bands, Execution, fly_samples
 from ident.validation.draws import draw
+from ident.validation.samples import batch_of
 from sim.boat.coefficients import Coefficients
 from sim.boat.row_codec import correlation_matrix
 from sim.files.record import Record, Written
 from sim.flight.case import load_case
 from sim.flight.series import load_reference
 from sim.flight.simulate import simulate
+from sim.kernel.rhs import BEGUN, MIDPOINT
 
 
 @pytest.fixture(scope="module")
@@ -49,12 +53,23 @@ def test_bands_do_not_depend_on_the_number_of_workers(short_case, campaign, rows
 
 
 def test_without_errors_every_sample_is_the_single_run(short_case, campaign, rows):
-    exact = rows.assign(stderr=0.0)
-    bands = fly_samples(short_case[0], campaign.vehicle, exact, 3)
+    """By steps of four stages to the last digits, by those of two to what is stated of them."""
     single = simulate(short_case[0], Coefficients(campaign.vehicle, rows))
+    batch = batch_of(short_case[0], campaign.vehicle, rows)
+    exact = replace(batch, scheme=BEGUN).fly(rows["value"].to_numpy()[None])[0].records[""]
+    bands = fly_samples(short_case[0], campaign.vehicle, rows.assign(stderr=0.0), 3)
+    assert batch.scheme == MIDPOINT
     for channel in ("theta", "q", "u", "z"):
-        for sample in bands.channels[channel]:
-            assert sample == pytest.approx(single[channel], rel=1e-12, abs=1e-12)
+        assert exact[batch.channels.index(channel)] == pytest.approx(single[channel], rel=1e-12, abs=1e-12)
+        apart = bands.channels[channel] - single[channel]
+        assert 0.0 < np.sqrt(np.mean(apart**2)) < 1e-4 * np.ptp(single[channel])
+
+
+def test_samples_take_four_stages_where_two_are_not_the_same_flight(short_case, campaign, rows):
+    coarse = short_case[0].model_copy(
+        update={"run": short_case[0].run.model_copy(update={"step_s": 1.0, "record_s": 1.0})}
+    )
+    assert batch_of(coarse, campaign.vehicle, rows).scheme == BEGUN
 
 
 def test_a_drawn_boat_is_port_starboard_symmetric(campaign, rows):

@@ -67,6 +67,23 @@ def test_halving_the_step_divides_the_error_by_sixteen(smooth):
     assert errors[1] / errors[2] == pytest.approx(16.0, rel=0.05)
 
 
+def test_halving_the_step_divides_the_error_of_the_midpoint_rule_by_four(smooth):
+    controls, still = np.zeros(6), np.zeros(6)
+    exact = _reference(smooth, START, controls, 40.0, rtol=1e-12)
+
+    def flown(step):
+        work, y = workspace(smooth), START.copy()
+        for _ in range(round(40.0 / step)):
+            kernel.rhs(smooth, y, controls, work, work.stage.start)
+            args = (smooth.real, smooth.whole, y, controls, still, step, (), work.real, work.whole, work.stage)
+            kernel.step(*args, kernel.MIDPOINT, y)
+        return y
+
+    errors = [np.linalg.norm(flown(h) - exact) for h in (0.1, 0.05, 0.025)]
+    assert errors[0] / errors[1] == pytest.approx(4.0, rel=0.05)
+    assert errors[1] / errors[2] == pytest.approx(4.0, rel=0.05)
+
+
 def _fixed_course(case, dv, dh):
     other = case.model_copy(deep=True)
     for command, value in ((other.command.dV, dv), (other.command.dH, dh)):

@@ -22,8 +22,8 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 # Source -> channel -> level -> share of the reference's points inside the band.
 Inside = dict[str, dict[str, dict[str, float]]]
-# Samples up to which their products are one matrix: beyond, it would be larger than all they are made of.
-_SQUARE = 2000
+# Instants of a record that stand for it: a band changes little from one to the next.
+_INSTANTS = 400
 # Probability that chance alone lists a coefficient as a cause of a channel's width.
 _BY_CHANCE = 0.01
 
@@ -130,7 +130,7 @@ def variance_shares(bands: Bands, channel: str, most: int = 8) -> list[VarianceS
 
     The share of the variance that a linear function of all values of a coefficient
     accounts for: the squared correlations of the channel with the coefficient's independent
-    scores, averaged over the record with the variance as weight, less what chance gives
+    scores, averaged over some 400 instants of the record with the variance as weight, less what chance gives
     (1/samples a score). Its standard error is the jackknife's, from the shares without one sample
     each (Efron and Stein 1981). By chance alone, the samples times the squared correlations are
     chi-square distributed with a degree of freedom a score; a coefficient is listed when its
@@ -150,17 +150,15 @@ def variance_shares(bands: Bands, channel: str, most: int = 8) -> list[VarianceS
     from scipy.special import chdtri
 
     values = bands.channels[channel]
-    complete = np.isfinite(values).all(axis=0)
-    spread = values[:, complete] - values[:, complete].mean(axis=0)
+    complete = np.flatnonzero(np.isfinite(values).all(axis=0))
+    spread = values[:, complete[:: max(1, complete.size // _INSTANTS)]]
+    spread -= spread.mean(axis=0)
     if len(values) < 3 or not spread.any():
         return []
     every = bands.scores()
     columns = np.concatenate(list(every.values()), axis=1)
-    if len(spread) <= _SQUARE:
-        products = product(spread, spread.T)
-        along, size = product(products, columns), np.diag(products)
-    else:
-        along, size = product(spread, product(spread.T, columns)), np.einsum("ij,ij->i", spread, spread)
+    along = product(spread, product(spread.T, columns))
+    size = product(np.ones((1, spread.shape[1])), (spread * spread).T)[0]
     del columns
     shares, first = [], 0
     for coefficient, independent in every.items():

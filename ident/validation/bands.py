@@ -110,7 +110,8 @@ class Bands:
         level : ``50`` or ``95`` [%].
         source : Whose record the flight starts as; the case's own start without one.
         """
-        key = (channel, source)
+        # A source without a start of its own has the edges of the case.
+        key = (channel, source if source in self.as_started else "")
         if key not in self._edges:
             self._edges[key] = _percentiles(self.of(source)[channel])
         low, high = (self._edges[key][p] for p in LEVELS[level])

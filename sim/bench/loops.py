@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 
 from sim.kernel.layout import Around, Stage
-from sim.kernel.rhs import fill_rate, step
+from sim.kernel.rhs import FROM_STATE, fill_rate, step
 from sim.waves.surroundings import near_of, prepare
 
 
@@ -37,4 +37,4 @@ def steps(
     near = near_of(around)
     for i in range(states.shape[0]):
         prepare(around, states[i], i * h)
-        step(m, w, states[i], controls[i], rate, h, near, s, k, stage, False, out)
+        step(m, w, states[i], controls[i], rate, h, near, s, k, stage, FROM_STATE, out)

@@ -41,7 +41,7 @@ from sim.flight.orders import (
     progress,
 )
 from sim.kernel.layout import Around, Model, Stage, Whole, Work, workspace
-from sim.kernel.rhs import fill_rate, step
+from sim.kernel.rhs import BEGUN, FROM_STATE, fill_rate, step
 from sim.waves.surroundings import near_of, prepare, read_gauge
 
 Array = NDArray[np.float64]
@@ -126,13 +126,13 @@ def _past(g: np.ndarray, q: np.ndarray, f: np.ndarray, j: np.ndarray, y: np.ndar
 
 
 @inner
-def _cross(v: Flight, near: Around, rate: np.ndarray, t: float, h: float, trial: np.ndarray) -> float:
+def _cross(v: Flight, near: Around, rate: np.ndarray, t: float, h: float, scheme: int, trial: np.ndarray) -> float:
     """Time into the step from ``t`` at which the first event happens; the state then into ``trial``."""
     low, high = 0.0, h
     while True:
         close = high - low <= _EVENT_TOLERANCE
         middle = high if close else 0.5 * (low + high)
-        step(v.m, v.w, v.y, v.c, rate, middle, near, v.s, v.k, v.stage, True, trial)
+        step(v.m, v.w, v.y, v.c, rate, middle, near, v.s, v.k, v.stage, scheme, trial)
         if close:
             return high
         if _past(v.g, v.q, v.f, v.j, trial, t + middle) >= 0.0:
@@ -215,7 +215,7 @@ def _turn_over(v: Flight, axis: int, now: float, log: Log, events: int) -> int:
 
 @outer
 def integrate(
-    v: Flight, around: Around, log: Log, dt: float, steps: int, every: int, start: float
+    v: Flight, around: Around, log: Log, dt: float, steps: int, every: int, scheme: int, start: float
 ) -> tuple[int, int, int, float]:
     """Integrate a maneuver.
 
@@ -226,6 +226,7 @@ def integrate(
     log : Filled with what happens.
     dt : Control sample and integration step [s].
     steps, every : Number of samples, and samples between records.
+    scheme : ``BEGUN`` or ``MIDPOINT`` of ``sim.kernel.rhs``.
     start : Time at the start [s]; a run may go on from where another ended.
 
     Returns
@@ -252,10 +253,10 @@ def integrate(
         left = dt
         while left > 0.0:
             now, part = start + sample * dt + (dt - left), left
-            step(v.m, v.w, v.y, v.c, rate, left, near, v.s, v.k, v.stage, True, trial)
+            step(v.m, v.w, v.y, v.c, rate, left, near, v.s, v.k, v.stage, scheme, trial)
             happens = (zigzag or programmed) and _past(v.g, v.q, v.f, v.j, trial, now + left) >= 0.0
             if happens:
-                part = _cross(v, near, rate, now, left, trial)
+                part = _cross(v, near, rate, now, left, scheme, trial)
             for i in range(N_STATES):
                 v.y[i] = trial[i]
             for i in range(v.c.size):
@@ -292,7 +293,7 @@ def hold_for(v: Flight, around: Around, rate: np.ndarray, left: float, h: float,
     """
     prepare(around, v.y, start)
     move_actuators(v.g, v.q, v.f, v.c, left, rate)
-    step(v.m, v.w, v.y, v.c, rate, h, near_of(around), v.s, v.k, v.stage, False, v.y)
+    step(v.m, v.w, v.y, v.c, rate, h, near_of(around), v.s, v.k, v.stage, FROM_STATE, v.y)
     for i in range(v.c.size):
         v.c[i] += h * rate[i]
     return _is_finite(v.y)
@@ -332,11 +333,15 @@ class Flown(NamedTuple):
 
 
 class Clock(NamedTuple):
-    """Steps of a flight: their length ``dt`` [s], how many at most, and every how many of them is recorded."""
+    """Steps of a flight: their length ``dt`` [s], how many at most, every how many of them is recorded, and how
+    each is taken: ``BEGUN`` or ``MIDPOINT`` of ``sim.kernel.rhs``, whose four stages or two begin with the rate that
+    the autopilot reads.
+    """
 
     dt: float
     steps: int
     every: int
+    scheme: int = BEGUN
 
 
 def fly_logged(
@@ -363,7 +368,7 @@ def fly_logged(
     while True:
         log = Log(record, np.zeros((room, 2)), np.zeros((room, 3)))
         flight = flight_of(model, settings, work, y0.copy(), c0.copy())
-        rows, executes, ended, end = integrate(flight, work.around, log, clock.dt, clock.steps, clock.every, 0.0)
+        rows, executes, ended, end = integrate(flight, work.around, log, *clock, 0.0)
         if max(executes, ended) <= room:
             break
         room = max(executes, ended)

@@ -21,6 +21,7 @@ from sim.flight.simulation import TANKS, Simulation
 from sim.flight.trim import Leveling, Trim, self_propulsion
 from sim.kernel.assemble import assemble, weight_across, with_tanks
 from sim.kernel.layout import Model
+from sim.kernel.rhs import BEGUN
 from sim.waves.in_waves import Water, surroundings, water_around
 from sim.waves.linear import Waves, calm, regular
 from sim.waves.spectra import Spectrum, realise, sea_state
@@ -167,7 +168,7 @@ def simulate(case: Case, coefficients: Coefficients) -> Simulation:
     return fly(case, coefficients.vehicle, model_of(case, coefficients), water_of(case, coefficients))
 
 
-def fly(case: Case, vehicle: Vehicle, model: Model, water: Water | None) -> Simulation:
+def fly(case: Case, vehicle: Vehicle, model: Model, water: Water | None, scheme: int = BEGUN) -> Simulation:
     """Fly a case with an assembled model.
 
     Parameters
@@ -176,6 +177,7 @@ def fly(case: Case, vehicle: Vehicle, model: Model, water: Water | None) -> Simu
     vehicle : The case's.
     model : From ``model_of``, which may be flown more than once.
     water : From ``water_of``, likewise; None in deep, calm water.
+    scheme : How a step is taken: ``BEGUN``, the classical Runge-Kutta step, or ``MIDPOINT`` of ``sim.kernel.rhs``.
 
     Returns
     -------
@@ -187,7 +189,7 @@ def fly(case: Case, vehicle: Vehicle, model: Model, water: Water | None) -> Simu
         When the case starts from self-propulsion and there is none.
     """
     model, state, controls, trim, settings = begun(case, vehicle, model)
-    clock = maneuver.Clock(case.run.step_s, *samples_of(case))
+    clock = maneuver.Clock(case.run.step_s, *samples_of(case), scheme)
     around = surroundings(water, model.added_mass) if water else ()
     flown = maneuver.fly_logged(model, settings, state, controls, clock, around)
     return Simulation(

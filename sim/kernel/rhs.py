@@ -60,6 +60,9 @@ _U_BY, _V_BY, _W_BY, _RATES = _AT["up"], _AT["vp"], _AT["wp"], _AT["pq"]
 _DRIFT, _TURN = _AT["v/U"], _AT["r/U"]
 _YAW_PIVOT, _PITCH_PIVOT = _AT["v/r"], _AT["w/q"]
 
+# Runge-Kutta schemes of a step.
+FROM_STATE, BEGUN, MIDPOINT = 0, 1, 2
+
 
 @inlined
 def _sign(x: float) -> float:
@@ -238,27 +241,29 @@ def step(
     s: np.ndarray,
     k: np.ndarray,
     stage: Stage,
-    begun: bool,
+    scheme: int,
     out: np.ndarray,
 ) -> None:
-    """One classical Runge-Kutta step; arguments as ``rk4`` and ``fill_rate``.
+    """One Runge-Kutta step; arguments as ``rk4`` and ``fill_rate``.
 
     With surroundings, ``sim.waves.surroundings.prepare`` comes before the step.
 
     Parameters
     ----------
-    begun : Whether ``stage.start`` holds the rate of the state already, a quarter of the work.
+    scheme : ``FROM_STATE``, the classical four stages; ``BEGUN``, the same where ``stage.start`` holds the
+        rate of the state already, a quarter of the work; ``MIDPOINT``, two stages, begun as well.
     """
     z, dy, total, moved = stage.state, stage.rate, stage.total, stage.controls
+    stages = 2 if scheme == MIDPOINT else 4
     # One call in a loop: four would be inlined four times, which takes long to compile.
-    for part in range(4):
+    for part in range(stages):
         ahead = h if part == 3 else (0.5 * h if part else 0.0)
         for i in range(c.size):
             moved[i] = c[i] + ahead * rate[i]
         for i in range(N_STATES):
             z[i] = y[i] + ahead * dy[i] if part else y[i]
         tick(near, ahead)
-        if part or not begun:
+        if part or scheme == FROM_STATE:
             _rate(m, w, z, moved, near, s, k, dy)
         else:
             for i in range(N_STATES):
@@ -267,7 +272,7 @@ def step(
         for i in range(N_STATES):
             total[i] = total[i] + twice * dy[i] if part else dy[i]
     for i in range(N_STATES):
-        out[i] = y[i] + h / 6.0 * total[i]
+        out[i] = y[i] + (h * dy[i] if scheme == MIDPOINT else h / 6.0 * total[i])
 
 
 def features(model: Model, y: np.ndarray, c: np.ndarray, work: Work) -> np.ndarray:
@@ -306,4 +311,6 @@ def rk4(model: Model, y: np.ndarray, c: np.ndarray, rate: np.ndarray, h: float, 
     c, rate : Controls at the start and their rates.
     h : Step [s].
     """
-    step(model.real, model.whole, y, c, rate, h, near_of(work.around), work.real, work.whole, work.stage, False, out)
+    step(
+        model.real, model.whole, y, c, rate, h, near_of(work.around), work.real, work.whole, work.stage, FROM_STATE, out
+    )
