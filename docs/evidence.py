@@ -68,8 +68,10 @@ def vehicles() -> str:
 def suboff_differences() -> str:
     """What an appendage adds alone: by the lines, and measured."""
     folder = DATA / "suboff" / "configurations"
-    rows = {n: database_rows(identify(read_campaign(folder / n))) for n in ("hull", "hull-sail", "hull-planes")}
-    found = differences(rows, "suboff")
+    folders = {n: folder / n for n in ("hull", "hull-sail", "hull-planes")} | {"full": DATA / "suboff"}
+    campaigns = {n: read_campaign(one) for n, one in folders.items()}
+    rows = {n: database_rows(identify(one)) for n, one in campaigns.items()}
+    found = differences(rows, "suboff", float(campaigns["full"].header.fluid.density_kgpm3))
     inside = sum(abs(d.score) < 1.96 for d in found)
     lines = [
         [

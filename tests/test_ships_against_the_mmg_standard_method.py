@@ -28,9 +28,9 @@ from sim.kernel.assemble import Assembly, assemble
 
 ROOT = Path(__file__).parents[1]
 WATER = Environment(1000.0, 9.81)
-# Tables 1 to 3 of the paper, forces over 1/2 rho L d U^2; resistance and place of the propeller as in
-# sim/vehicles/kvlcc2-mmg_errata.csv.
-LENGTH, DRAUGHT, MASS, X_G, DIAMETER, HEIGHT, AREA = 7.0, 0.46, 3270.0, 0.25, 0.216, 0.345, 0.0539
+# Tables 1 to 3 of the paper, forces over 1/2 rho L d U^2; resistance, place of the propeller and rounded particulars as
+# in sim/vehicles/kvlcc2-mmg_errata.csv.
+LENGTH, DRAUGHT, MASS, X_G, DIAMETER, HEIGHT, AREA = 7.0, 0.455, 3272.15, 0.245, 0.216, 0.345, 0.053833
 HULL = {
     "X": ((0, 0, -0.0162), (2, 0, -0.040), (1, 1, 0.002), (0, 2, 0.011), (4, 0, 0.771)),
     "Y": ((1, 0, -0.315), (0, 1, 0.083), (3, 0, -1.607), (2, 1, 0.379), (1, 2, -0.391), (0, 3, 0.008)),
@@ -111,7 +111,7 @@ def test_the_turning_circle_is_that_of_the_papers_equations(turn):
 
 
 def test_the_papers_own_turning_circles_and_overshoots_come_out(tmp_path):
-    """Tables 4 and 5 of the paper, its calculation at model scale: 3 %, but for one overshoot of 10.2 deg, 3.3 %."""
+    """Tables 4 and 5 of the paper, its calculation at model scale: within 3 %."""
     ident.fit(ROOT / "raw_captive_data" / "kvlcc2-mmg", db=tmp_path / "db")
     off = {}
     for name in sorted(n for n in bundled("cases") if n.startswith("kvlcc2-mmg-")):
@@ -119,8 +119,7 @@ def test_the_papers_own_turning_circles_and_overshoots_come_out(tmp_path):
         for p in done.case.published:
             off[name, p.metric] = abs(done.metrics[p.metric].simulated / p.value - 1.0)
     assert len(off) == 10
-    assert sum(x <= 0.03 for x in off.values()) >= 9, off
-    assert max(off.values()) <= 0.035, off
+    assert max(off.values()) <= 0.03, off
 
 
 def test_heave_roll_and_pitch_are_held(turn):

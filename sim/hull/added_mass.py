@@ -2,6 +2,7 @@
 
     pip install 'ident-submarine[panels]'
     python -m sim.hull.added_mass --vehicle bb2 --depth 2.5 --depth 25 --omega 0 --omega inf
+    python -m sim.hull.added_mass --vehicle suboff --prime
 
 Potential flow, zero speed, linear free surface, boat at rest and fully submerged: no
 viscosity, no forward-speed terms, no emergence. Parts that overlap (sail on deck, roots on
@@ -25,6 +26,13 @@ if TYPE_CHECKING:
     import pandas as pd
 
 Array = NDArray[np.float64]
+
+# Loads and motions by their letters; panel sizes over that of the geometry file from which added mass is continued.
+_LOADS, _MOTIONS = "XYZKMN", "uvwpqr"
+_SYMMETRIC = [(i, j) for plane in ((0, 2, 4), (1, 3, 5)) for i in plane for j in plane]
+SIZES = (2.0, 1.5)
+# Horizontal derivative -> the vertical one that it is for a body alike in both planes, and its sign (a turn about x).
+TURNED = {"Y_vdot": ("Z_wdot", 1.0), "N_rdot": ("M_qdot", 1.0), "Y_rdot": ("Z_qdot", -1.0), "N_vdot": ("M_wdot", -1.0)}
 
 DOFS = ("Surge", "Sway", "Heave", "Roll", "Pitch", "Yaw")
 # Half a turn about x: z up for the panel method, and back.
@@ -147,10 +155,71 @@ def depth_table(
     return pd.DataFrame(rows)
 
 
+def prime_added_mass(meshes: Sequence[Mesh], length: float, sizes: Sequence[float] = SIZES) -> dict[str, Array]:
+    """Added mass in unbounded water as derivatives, by two panel sizes and continued to panels of no size.
+
+    Flat panels with a constant source lose a share of added mass that falls as their size: the two values are
+    continued in a straight line. A spheroid of the proportions of a submarine and a thin ellipsoid come within 3 %
+    of Lamb's closed form by ``SIZES``.
+
+    Parameters
+    ----------
+    meshes : The surface by two panel sizes, about the body origin.
+    length : L of the normalisation [m].
+    sizes : The panel sizes over one another.
+
+    Returns
+    -------
+    ``Y_vdot``, ... -> (3,) by the first, the second, and continued, in 1/2 rho L^n with n = 3, 4, 5: those of a body
+    with port/starboard symmetry.
+
+    References
+    ----------
+    .. [1] Hess, J. L., Smith, A. M. O., J. Ship Research 8(2), 1964.
+    .. [2] Lamb, H., Hydrodynamics, 1932, arts. 114, 121.
+    """
+    by_size = []
+    for mesh in meshes:
+        added = panel_added_mass(wetted_panels(mesh), np.inf, [np.inf], 1.0, 1.0)[0][0]
+        turns = np.arange(6) // 3
+        power = 3.0 + np.add.outer(turns, turns)
+        by_size.append(-2.0 * added / length**power)
+    coarse, fine = by_size
+    continued = fine - (coarse - fine) * sizes[1] / (sizes[0] - sizes[1])
+    values = np.stack([coarse, fine, continued], axis=-1)
+    return {f"{_LOADS[i]}_{_MOTIONS[j]}dot": values[i, j] for i, j in _SYMMETRIC}
+
+
+def between_planes(derivatives: dict[str, Array]) -> dict[str, float]:
+    """What the horizontal plane has more than the vertical one turned by 90 deg: a sail, or planes of one pair.
+
+    Panels lose the same of both planes, so that the difference does not need to be continued: the finer size's.
+
+    Parameters
+    ----------
+    derivatives : Of ``prime_added_mass``.
+    """
+    return {name: float(derivatives[name][1] - sign * derivatives[of][1]) for name, (of, sign) in TURNED.items()}
+
+
+def _prime_table(path: str, length: float) -> pd.DataFrame:
+    """Derivatives of a geometry file by both panel sizes, continued, and between the planes."""
+    import pandas as pd
+
+    from sim.hull.surface import read_geometry
+
+    known = prime_added_mass([read_geometry(path, size) for size in SIZES], length)
+    more = between_planes(known)
+    sizes = [f"panels_{size:g}" for size in SIZES]
+    table = pd.DataFrame(known, index=[*sizes, "continued"]).T.rename_axis("derivative").reset_index()
+    return table.assign(over_the_other_plane=table["derivative"].map(more))
+
+
 @click.command()
 @click.option("--vehicle", "name", required=True, help="Bundled name or vehicle file.")
 @click.option("--depth", "depths", multiple=True, type=float, default=(2.5, 25.0), show_default=True, help="D0 [m].")
 @click.option("--omega", "omegas", multiple=True, type=float, default=(0.0, np.inf), show_default=True, help="[rad/s].")
+@click.option("--prime", is_flag=True, help="Derivatives in deep water instead, in 1/2 rho L^n, by two panel sizes.")
 @click.option("--coarser", default=2.0, show_default=True, help="Panel size over that of the geometry file.")
 @click.option("--density", default=1025.0, show_default=True, help="[kg/m^3].")
 @click.option("--gravity", default=9.81, show_default=True, help="[m/s^2].")
@@ -159,6 +228,7 @@ def main(
     name: str,
     depths: tuple[float, ...],
     omegas: tuple[float, ...],
+    prime: bool,
     coarser: float,
     density: float,
     gravity: float,
@@ -175,9 +245,12 @@ def main(
         vehicle = load_vehicle(name)
         if vehicle.geometry is None:
             raise InputError(f"vehicle {vehicle.name}, key geometry", "nothing", "a geometry file")
-        mesh = read_geometry(vehicle.geometry, coarser)
-        top = vehicle.needed_sail_top("added mass near the surface")[2]
-        table = depth_table(mesh, top, depths, omegas, density, gravity)
+        if prime:
+            table = _prime_table(vehicle.geometry, vehicle.particulars.length.value)
+        else:
+            mesh = read_geometry(vehicle.geometry, coarser)
+            top = vehicle.needed_sail_top("added mass near the surface")[2]
+            table = depth_table(mesh, top, depths, omegas, density, gravity)
     except InputError as error:
         raise click.UsageError(str(error)) from error
     text = table.to_csv(index=False, float_format="%.6g")
