@@ -8,6 +8,7 @@ from ident.commands import starting  # noqa: F401
 import os
 import signal
 import sys
+from collections.abc import Callable
 from typing import Any, NoReturn
 
 import click
@@ -29,6 +30,23 @@ class Commands(click.Group):
         with ends_when_asked():
             return super().main(*args, **kwargs)
 
+    def make_context(self, *args: Any, **kwargs: Any) -> click.Context:
+        """The options before a command's name; a mistake in them is said as one behind it."""
+        try:
+            return super().make_context(*args, **kwargs)
+        except click.ClickException as error:
+            _say(error.show)
+            raise click.exceptions.Exit(error.exit_code) from error
+        except BrokenPipeError:
+            silence("stdout")
+            raise click.exceptions.Exit(1) from None
+        except OSError as error:
+            # Of --version and --help, before there is a context to be refused in.
+            words = f"Error: standard output: {error.strerror}"
+            silence("stdout")
+            _say(lambda: click.echo(words, err=True))
+            raise click.exceptions.Exit(2) from error
+
     def invoke(self, ctx: click.Context) -> Any:
         """Run a command; ``InputError`` and what the system refuses become a message."""
         try:
@@ -41,8 +59,11 @@ class Commands(click.Group):
         except BrokenPipeError:
             silence("stdout")
             ctx.exit(1)
-        except (click.exceptions.Exit, click.ClickException):
+        except click.exceptions.Exit:
             raise
+        except click.ClickException as error:
+            _say(error.show)
+            ctx.exit(error.exit_code)
         except (Asked, KeyboardInterrupt) as given:
             # Outside of the main thread, and where there are no signals of POSIX, it is Python's own.
             asked = given if isinstance(given, Asked) else Asked(signal.SIGINT)
@@ -73,10 +94,22 @@ def _stands_somewhere() -> bool:
 
 def _refuse(ctx: click.Context, where: str, found: str, allowed: str) -> NoReturn:
     """One message, exit code 2."""
-    click.secho(f"Error: {visible(where)}", fg="red", err=True)
-    click.echo(f"  found:   {visible(found)}", err=True)
-    click.echo(f"  allowed: {visible(allowed)}", err=True)
+
+    def show() -> None:
+        click.secho(f"Error: {visible(where)}", fg="red", err=True)
+        click.echo(f"  found:   {visible(found)}", err=True)
+        click.echo(f"  allowed: {visible(allowed)}", err=True)
+
+    _say(show)
     ctx.exit(2)
+
+
+def _say(show: Callable[[], object]) -> None:
+    """Show a message; where standard error takes none, the exit code says it alone."""
+    try:
+        show()
+    except OSError:
+        silence("stderr")
 
 
 @click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"]})

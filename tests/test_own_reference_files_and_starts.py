@@ -15,12 +15,13 @@ from ident.cli import main
 from ident.options import OwnReference
 from ident.validation.band_summary import inside
 from ident.validation.bands import fly_samples
+from ident.validation.trial_reference import smoothed
 from ident.validation.validate import validate
 from sim.boat.coefficients import Coefficients
 from sim.files.errors import InputError
 from sim.files.record import Record
 from sim.flight.case import load_case
-from sim.flight.series import load_reference
+from sim.flight.series import Series, load_reference
 from sim.flight.simulate import simulate
 
 DATA = files("sim") / "cases" / "data"
@@ -43,7 +44,7 @@ def test_bundled_file_given_as_own_gives_the_bundled_errors(tmp_path, fitted_db)
 
 
 def test_a_time_of_another_size_is_refused_with_its_channel(tmp_path, fitted_db):
-    """A last sample after thirty years: no smooth path goes through it."""
+    """A last sample after thirty years."""
 
     def late(table):
         rolled = (table["source"] == "EXP") & (table["channel"] == "phi")
@@ -52,7 +53,16 @@ def test_a_time_of_another_size_is_refused_with_its_channel(tmp_path, fitted_db)
 
     with pytest.raises(InputError) as refused:
         validate("roll-decay", fitted_db, reference=_own(tmp_path / "mine.csv", "roll_decay.csv", late))
-    assert refused.value.where.endswith("mine.csv, EXP phi")
+    assert refused.value.where.endswith("mine.csv, row 240, EXP phi")
+    assert "to 1e+09" in refused.value.found
+
+
+def test_values_that_no_smooth_path_goes_through_are_refused_with_their_channel():
+    t = np.concatenate([np.arange(60.0), [1e9]])
+    series = Series({"TANK": {"theta": Record("theta", t, 0.1 * np.sin(t), "rad")}}, "t")
+    with pytest.raises(InputError) as refused:
+        smoothed(series, "mine.csv")
+    assert refused.value.where.endswith("mine.csv, TANK theta")
     assert "to 1e+09 s" in refused.value.found
 
 
@@ -68,14 +78,18 @@ def test_frame_option_turns_the_file(tmp_path, fitted_db):
         validate("turn20-23.69m", fitted_db, reference=OwnReference(path, frame="program")).to_dict()["references"]
         == bundled
     )
-    wrong = validate("turn20-23.69m", fitted_db, reference=OwnReference(path, frame="source")).to_dict()["references"]
-    assert wrong["CFD"]["x"]["rmse"] > bundled["CFD"]["x"]["rmse"]
+    with pytest.raises(InputError, match="astern"):
+        validate("turn20-23.69m", fitted_db, reference=OwnReference(path, frame="source"))
 
 
 def test_every_channel_of_the_simulation_is_compared(tmp_path, fitted_db):
     """A case without a bundled reference: two sources, a channel nobody has, no sigma."""
     t = np.arange(0.0, 60.0, 1.0)
-    rows = [("TANK", c, x, 0.01 * x, u) for c, u in (("theta", "deg"), ("q", "rad/s"), ("mood", "-")) for x in t]
+    rows = [
+        ("TANK", c, x, 0.01 * (x if c != "q" else 1.0), u)
+        for c, u in (("theta", "deg"), ("q", "deg/s"), ("mood", "-"))
+        for x in t
+    ]
     rows += [("HDM", "theta", x, 0.02 * x, "deg") for x in t]
     path = tmp_path / "mine.csv"
     pd.DataFrame(rows, columns=["source", "channel", "t", "value", "unit"]).to_csv(path, index=False)
@@ -116,7 +130,7 @@ def test_command_line_takes_an_own_reference(tmp_path, fitted_db):
         ("source,channel,t,value,unit\nA,x,900,1,m\n", ["begins", "900"]),
         (
             "source,channel,t,value,unit\nA,x,0,1,m\nA,x,1e9,1,m\n",
-            ["A x", "one of 2 points", "1e+09", "run, which ends"],
+            ["A x", "row 3", "t goes to 1e+09", "to 50 times the run"],
         ),
         ("source,channel,t,value,unit\nA,x,0,1,m\n", ["A x", "one point", "two points or more"]),
         ("source,channel,t,value,unit,Sigma\nA,x,0,1,m,1\n", ["column Sigma", "sigma?"]),
@@ -144,7 +158,7 @@ def test_points_beyond_the_run_and_units_of_time_are_said(tmp_path, fitted_db):
     t = np.linspace(0.0, 2.0 * end, 41)
     path = tmp_path / "mine.csv"
     for times, words in ((t, ["points of theta lie beyond", "not compared"]), (t / 120.0, ["is t in s?"])):
-        rows = [("TANK", "theta", x, 0.0, "rad") for x in times]
+        rows = [("TANK", "theta", x, 1e-4 * x, "rad") for x in times]
         pd.DataFrame(rows, columns=["source", "channel", "t", "value", "unit"]).to_csv(path, index=False)
         (note,) = validate("vzz10-15kt", fitted_db, reference=path).notes
         assert all(word in note for word in words), note

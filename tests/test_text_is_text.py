@@ -263,6 +263,13 @@ def test_every_encoding_and_every_end_of_a_stream(tmp_path, fitted_db):
         assert code is None or done.returncode == code
         assert b"Traceback" not in done.stderr
         assert b"Exception ignored" not in done.stderr
+    # What standard error takes no more is still a mistake; before the command's name as behind it.
+    for words in ("trial nofile", "fit nofolder", "--nosuch", "validate"):
+        for end in ("2>&-", "2>/dev/full"):
+            done = shell(f'"{sys.executable}" -m ident.cli {words} {end}', env)
+            assert (done.returncode, done.stdout) == (2, b""), (words, end)
+    done = shell(f'"{sys.executable}" -m ident.cli --version >/dev/full', env)
+    assert (done.returncode, done.stderr) == (2, b"Error: standard output: No space left on device\n")
     gone = f'mkdir "{tmp_path}/gone"; cd "{tmp_path}/gone"; rmdir "{tmp_path}/gone"; {command}'
     done = shell(gone, env)
     assert done.returncode == 2

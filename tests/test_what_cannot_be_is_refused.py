@@ -87,6 +87,8 @@ def test_every_bundled_vehicle_can_be(name):
         ("leading_edge = [-1, 0, 0]", "leading_edge = [0, 1, 1]", "stern_plane_1, leading_edge"),
         ("value = 70.2,", "value = 702.0,", "particulars.length"),
         ("[3.433, 17.6, 17.522]", "[17.6, 3.433, 17.522]", "radius_of_gyration"),
+        ("value = 70.2,", "value = 140.4,", "radius_of_gyration"),
+        ("value = 70.2,", "value = 42.0,", "radius_of_gyration"),
         ("[0.0, 0.0, 11.37]", "[0.0, 11.37, 0.0]", "sail_top"),
         ("[0.0, 0.0, 0.4741]", "[0.0, 0.4741, 0.0]", "centre_of_buoyancy"),
         ("[-27.2503, 0.0, 0.0081]", "[0.0081, -27.2503, 0.0]", "sections, Hull 1"),
@@ -216,6 +218,10 @@ def test_a_start_outside_of_the_sea_is_refused(key, value):
         ({"height_m": 0.001, "period_s": 1e-9}, False),
         ({"height_m": 0.001, "period_s": 1e-300}, False),
         ({"kind": "jonswap", "height_m": 30.0, "period_s": 8.0}, False),
+        ({"height_m": 1.0, "period_s": 1e9}, False),
+        ({"height_m": 1e9, "period_s": 1e9}, False),
+        ({"height_m": 40.0, "period_s": 30.0}, False),
+        ({"height_m": 30.0, "period_s": 18.0}, True),
     ],
 )
 def test_waves_steeper_than_michells_break(waves, stands):

@@ -11,6 +11,8 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from ident.calibration.file import CalibrationFile, Parameter, Training, apply
+from ident.validation.reference_limits import check_records
+from ident.validation.reference_pairs import check_pairs
 from ident.validation.references import check_reference
 from ident.validation.trial_reference import TRIAL, Referenced, referenced
 from sim.boat.coefficients import Coefficients
@@ -224,6 +226,8 @@ def problem(
         recorded = case.reference is not None and case.reference.controls == "recorded"
         case, reference = held.case, held.series
         check_reference(case, reference, place)
+        check_records(case, reference, vehicle, place)
+        check_pairs(case, reference, vehicle, place)
         # A case names its vehicle, or the vehicle's file.
         flown = load_vehicle(case.vehicle, beside=place).name
         if flown != vehicle.name:

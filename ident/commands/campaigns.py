@@ -9,7 +9,20 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ident.commands.shared import DB, MESSAGE, OUT, WAIT, AnyNumber, console_for, either, emit, json_to, out_file, told
+from ident.commands.shared import (
+    DB,
+    MESSAGE,
+    OUT,
+    WAIT,
+    AnyNumber,
+    PathType,
+    console_for,
+    either,
+    emit,
+    json_to,
+    out_file,
+    told,
+)
 from ident.text import on_screen
 
 if TYPE_CHECKING:
@@ -57,7 +70,7 @@ class PlanOptions:
 
 
 @click.command()
-@click.argument("folder", type=click.Path(path_type=Path))
+@click.argument("folder", type=PathType())
 @DB
 @MESSAGE
 @json_to("Write the summary as JSON.")
@@ -103,7 +116,7 @@ def fit(**options: Any) -> None:
 
 
 @click.command()
-@click.argument("folder", type=click.Path(path_type=Path))
+@click.argument("folder", type=PathType())
 @json_to("Write the findings as JSON.")
 @click.option("--strict", is_flag=True, help="Exit 1 when a finding is an error.")
 @click.option("--all", "everything", is_flag=True, help="Every finding with its remedy, not a line a check.")
@@ -128,8 +141,8 @@ def check(folder: Path, json_path: str | None, strict: bool, everything: bool) -
 
 
 @click.command()
-@click.argument("folder", type=click.Path(path_type=Path))
-@click.argument("cases_folder", metavar="[OUT]", type=click.Path(path_type=Path), required=False, callback=either)
+@click.argument("folder", type=PathType())
+@click.argument("cases_folder", metavar="[OUT]", type=PathType(), required=False, callback=either)
 @click.option(
     "--target-rel",
     type=AnyNumber(),
@@ -137,10 +150,10 @@ def check(folder: Path, json_path: str | None, strict: bool, everything: bool) -
     show_default=True,
     help="Standard error wanted, relative to a term's size.",
 )
-@click.option("--facility", type=click.Path(path_type=Path), default=None, help="TOML file of levels and limits.")
+@click.option("--facility", type=PathType(), default=None, help="TOML file of levels and limits.")
 @click.option("--cases", type=click.Choice(["openfoam"]), default=None, help="Write a CFD case for every run into OUT.")
-@click.option("--surface", type=click.Path(path_type=Path), default=None, help="With --cases: STL file of the boat.")
-@click.option("--template", type=click.Path(path_type=Path), default=None, help="With --cases: TOML file of settings.")
+@click.option("--surface", type=PathType(), default=None, help="With --cases: STL file of the boat.")
+@click.option("--template", type=PathType(), default=None, help="With --cases: TOML file of settings.")
 @out_file("Write the test matrix as CSV.")
 @json_to("Write terms and runs as JSON.")
 def plan(**options: Any) -> None:
@@ -193,7 +206,7 @@ def _cases(asked: PlanOptions) -> Batch:
 
 
 @click.command()
-@click.argument("folder", type=click.Path(path_type=Path))
+@click.argument("folder", type=PathType())
 @OUT
 @json_to("Write the run table as JSON.")
 def runs(folder: Path, out: Path, json_path: str | None) -> None:

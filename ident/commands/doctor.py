@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ident.commands.shared import WAIT, console_for, emit, json_to
+from ident.commands.shared import WAIT, PathType, console_for, emit, json_to
 
 if TYPE_CHECKING:
     from ident.database.installation import Installation
 
 
 @click.command()
-@click.argument("folders", type=click.Path(path_type=Path), nargs=-1)
+@click.argument("folders", type=PathType(), nargs=-1)
 @click.option("--db", default=None, help="Database folder or object-store URL to examine.")
 @click.option("--repair", is_flag=True, help="Restore what can be restored; damaged files are set aside in .damaged.")
 @WAIT

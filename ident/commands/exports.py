@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from ident.commands.shared import DB, VERSION, WAIT, console_for, either, emit, equilibrium_of, json_to
+from ident.commands.shared import DB, VERSION, WAIT, PathType, console_for, either, emit, equilibrium_of, json_to
 from ident.text import on_screen, visible
 
 # Formats that write the coefficients, and those that write a boat in a case.
@@ -19,7 +19,7 @@ _CASE = "hzz20"
 
 
 @click.command()
-@click.argument("path", type=click.Path(path_type=Path), callback=either)
+@click.argument("path", type=PathType(), callback=either)
 @click.option("--format", "kind", type=click.Choice([*_ROWS, *_FLOWN, *_VEHICLE]), default="csv", show_default=True)
 @click.option(
     "--case",
@@ -129,7 +129,7 @@ def _flown(
 
 
 @click.command("import")
-@click.argument("path", type=click.Path(path_type=Path))
+@click.argument("path", type=PathType())
 @DB
 @WAIT
 @json_to("Write what was imported as JSON.")

@@ -18,6 +18,7 @@ from ident.commands.shared import (
     VERSION,
     WAIT,
     Number,
+    PathType,
     console_for,
     emit,
     equilibrium_of,
@@ -115,7 +116,7 @@ class CalibrateOptions:
 @click.option("--all", "every", is_flag=True, help="Fly every bundled case and print the scoreboard.")
 @click.option(
     "--cases",
-    type=click.Path(path_type=Path),
+    type=PathType(),
     default=None,
     help="With --all: a folder of your own cases too.",
 )
@@ -151,11 +152,11 @@ class CalibrateOptions:
 @click.option("--angle", type=Number(0, 90, min_open=True), default=None, help="With --case: planes [deg].")
 @click.option(
     "--reference",
-    type=click.Path(path_type=Path),
+    type=PathType(),
     default=None,
     help="With --case: a recorded trial, or a CSV of source, channel, t or s, value, unit, and sigma if known.",
 )
-@click.option("--trial", type=click.Path(path_type=Path), default=None, help="With --reference: its trial.toml.")
+@click.option("--trial", type=PathType(), default=None, help="With --reference: its trial.toml.")
 @click.option(
     "--frame",
     type=click.Choice(["source", "program"]),

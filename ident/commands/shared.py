@@ -34,6 +34,19 @@ class Number(AnyNumber, click.FloatRange):
     """A finite number of a range."""
 
 
+class PathType(click.Path):
+    """A path that is one: nothing at all would be the working folder, which nobody meant."""
+
+    def __init__(self) -> None:
+        super().__init__(path_type=Path)
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """The path; fails as click does."""
+        if not str(value):
+            self.fail("'' (allowed: a file or folder; . is the working folder)", param, ctx)
+        return super().convert(value, param, ctx)
+
+
 DB = click.option("--db", default="coeff_db", show_default=True, help="Database folder or object-store URL.")
 WAIT = click.option(
     "--wait",
@@ -86,7 +99,7 @@ def _drawing(context: click.Context, parameter: click.Parameter, value: Path | N
 
 def figure_to(text: str) -> Any:
     """The option ``--figure`` of a command, with its help."""
-    return click.option("--figure", type=click.Path(path_type=Path), default=None, callback=_drawing, help=text)
+    return click.option("--figure", type=PathType(), default=None, callback=_drawing, help=text)
 
 
 def _inputs(command: click.Command, values: dict[str, Any]) -> list[Path]:
@@ -157,18 +170,18 @@ def inputs_kept(command: click.Command) -> click.Command:
 # Where a command writes is looked at before it works: a calibration of minutes must not end at a wrong path.
 OUT = click.option(
     "--out",
-    type=click.Path(path_type=Path),
+    type=PathType(),
     default=Path("reports"),
     show_default=True,
     callback=_folder,
     help="Folder to write to.",
 )
-FOLDER = click.argument("folder", type=click.Path(path_type=Path), callback=_folder)
+FOLDER = click.argument("folder", type=PathType(), callback=_folder)
 
 
 def out_file(text: str) -> Any:
     """The option ``--out`` of a command that writes one file."""
-    return click.option("--out", type=click.Path(path_type=Path), default=None, callback=_file, help=text)
+    return click.option("--out", type=PathType(), default=None, callback=_file, help=text)
 
 
 def json_to(text: str) -> Any:

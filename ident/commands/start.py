@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from ident.commands.shared import FOLDER, AnyNumber, Number, either, emit, json_to
+from ident.commands.shared import FOLDER, AnyNumber, Number, PathType, either, emit, json_to
 
 
 @click.command()
@@ -45,7 +45,7 @@ def schema(kind: str, json_path: str | None) -> None:
 
 
 @click.command()
-@click.argument("surface", type=click.Path(path_type=Path))
+@click.argument("surface", type=PathType())
 @click.option("--unit", type=click.Choice(["m", "mm", "cm", "in", "ft"]), required=True, help="Of the surface.")
 @click.option("--length", type=Number(0, 1e4, min_open=True), required=True, help="Over all [m]; checks the unit.")
 @click.option("--x", type=click.Choice(["aft", "forward"]), default="aft", show_default=True, help="Where x points.")
@@ -53,7 +53,7 @@ def schema(kind: str, json_path: str | None) -> None:
 @click.option("--axis", type=AnyNumber(), default=0.0, show_default=True, help="z of the hull's axis, in the unit.")
 @click.option(
     "--out",
-    type=click.Path(path_type=Path),
+    type=PathType(),
     required=True,
     callback=either,
     help="Folder for hull.toml and hull_offsets.csv.",

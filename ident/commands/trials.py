@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from ident.commands.shared import Number, console_for, either, emit, json_to, out_file
+from ident.commands.shared import Number, PathType, console_for, either, emit, json_to, out_file
 from ident.text import on_screen
 
 # What may follow the first word of a maneuver: its angles, and second words.
@@ -32,14 +32,14 @@ class _Maneuver(click.Command):
 
 
 @click.command(cls=_Maneuver)
-@click.argument("path", metavar="FILE|DIR", type=click.Path(path_type=Path))
-@click.option("--spec", type=click.Path(path_type=Path), default=None, help="trial.toml: what the record does not say.")
+@click.argument("path", metavar="FILE|DIR", type=PathType())
+@click.option("--spec", type=PathType(), default=None, help="trial.toml: what the record does not say.")
 @click.option("--maneuver", default="", help="As zigzag 20/20 or turning_circle 35, instead of the spec's.")
 @click.option("--scale", type=Number(min=0, min_open=True), default=None, help="Full scale over model scale.")
 @click.option("--length", "length", type=Number(min=0, min_open=True), default=None, help="L [m], full scale.")
 @click.option(
     "--figures",
-    type=click.Path(path_type=Path),
+    type=PathType(),
     default=None,
     callback=either,
     help="Folder for the plots of the report.",

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from ident.commands.shared import DB, OUT, VERSION, WAIT, console_for, emit, figure_to, json_to
+from ident.commands.shared import DB, OUT, VERSION, WAIT, PathType, console_for, emit, figure_to, json_to
 from ident.text import on_screen, visible
 
 
@@ -23,7 +23,7 @@ from ident.text import on_screen, visible
 )
 @click.option(
     "--scoreboard",
-    type=click.Path(path_type=Path),
+    type=PathType(),
     default=None,
     help="JSON of `ident validate --all`: errors of flights, linked to the values behind them.",
 )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from difflib import get_close_matches
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,7 +47,7 @@ def check_reference(case: Case, reference: Series, where: str) -> list[str]:
         for unit in sorted(units - allowed):
             text = f"{channel} in {unit!r}"
             raise InputError(case.reference.file or where, text, " or ".join(sorted(allowed)))
-    return [*_unknown(case.reference.file or where, reference), *_spikes(case, reference)]
+    return [*_unknown(case.reference.file or where, reference, named), *_spikes(case, reference)]
 
 
 def _spikes(case: Case, reference: Series) -> list[str]:
@@ -64,10 +65,15 @@ def _spikes(case: Case, reference: Series) -> list[str]:
     return said
 
 
-def _unknown(file: str, reference: Series) -> list[str]:
-    """Channels that are none of a simulation's; those that are so by their spelling are refused."""
+def _unknown(file: str, reference: Series, named: set[str]) -> list[str]:
+    """Sources that nothing names, and channels that are none of a simulation's; a slip of spelling is refused."""
     said = []
     for source, channels in reference.data.items():
+        if source not in named:
+            rows = sum(len(record) for record in channels.values())
+            like = get_close_matches(source, sorted(named), 1)
+            more = f"; is it {like[0]!r}?" if like else ""
+            said.append(f"reference: source {source!r} with {rows} rows is compared with nothing{more}")
         for name in channels:
             if name in CHANNELS:
                 continue

@@ -19,6 +19,8 @@ from ident.options import Conditions, OwnReference
 from ident.validation.boats import Boat, Fleet
 from ident.validation.coverage import outside_tables
 from ident.validation.other_boat import check_answers, for_boat, saturated
+from ident.validation.reference_limits import check_records
+from ident.validation.reference_pairs import check_pairs, units_by_flight
 from ident.validation.references import beyond_the_run, check_reference, compared
 from ident.validation.result import ChannelError, Validation
 from ident.validation.sweep import with_grid
@@ -206,7 +208,7 @@ def _with_reference(case: Case, record: OwnReference) -> Referenced:
         frame=declared,
         initial={k: v for k, v in (case.reference.initial if case.reference else {}).items() if k in compare},
     )
-    return Referenced(case.model_copy(update={"reference": reference, "tolerance": []}), smoothed(series, str(path)))
+    return Referenced(case.model_copy(update={"reference": reference, "tolerance": []}), series)
 
 
 @gathered(
@@ -301,7 +303,11 @@ def _validated(as_held: tuple[Referenced, Vehicle, str, list[str]], fleet: Fleet
         in_waves=measures.in_waves,
         passed=bool(np.isfinite(simulation.end).all() and met),
         saturated=saturated(simulation, flown, ship),
-        notes=[*notes, *beyond_the_run(flown, held.series, simulation, as_started)],
+        notes=[
+            *notes,
+            *beyond_the_run(flown, held.series, simulation, as_started),
+            *units_by_flight(flown, held.series, simulation, as_started),
+        ],
     )
 
 
@@ -321,6 +327,11 @@ def _held_against(
     else:
         held = referenced(flown, where)
     unknown = check_reference(held.case, held.series, where)
+    file = held.case.reference.file if held.case.reference and held.case.reference.file else where
+    unknown += check_records(held.case, held.series, ship, file)
+    check_pairs(held.case, held.series, ship, file)
+    if reference is not None and not held.series.smooth:
+        smoothed(held.series, file)
     _check_tolerances(held.case, held.series)
     return held, ship, where, [*notes, *held.notes, *unknown]
 

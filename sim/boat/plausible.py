@@ -22,6 +22,9 @@ _MOST_ADDED = (1.0, 5.0, 5.0, 5.0, 5.0, 5.0)
 _LEAST_ADDED = -0.05
 # Displaced volume over length^3: a sphere has pi / 6, a cylinder fifty times as long as wide 3e-4.
 _FULLNESS = (3e-4, math.pi / 6.0)
+# Radii of gyration in pitch and yaw over the length: an ellipsoid has 0.22, a rod 0.29, boats 0.22 to 0.30 (ITTC
+# 7.5-02-06-03 takes 0.25 where nothing is known); half or twice of that is of another length.
+_SPREAD = (0.17, 0.4)
 # From fresh water to brine, what a body may displace [kg/m^3]: only the size of its length is looked at.
 _WATER = (990.0, 1250.0)
 # Longest way of a plane from amidships to its limit [s]: rudders of ships take 15 (SOLAS II-1, regulation 29).
@@ -172,6 +175,10 @@ def _mass(vehicle: Any) -> Iterator[tuple[str, str, str]]:
     if light < _FULLNESS[0] or dense > _FULLNESS[1]:
         found = f"{given.displaced_mass.value:g} kg of water displaced over {length:g} m: {light:.3g} of length^3"
         yield "particulars.length", found, f"{_FULLNESS[0]:g} to {_FULLNESS[1]:.2g}, from a needle to a sphere"
+    for axis, radius in zip(("pitch", "yaw"), radii[1:], strict=True):
+        if not _SPREAD[0] <= radius / length <= _SPREAD[1]:
+            text = f"a radius of {axis} of {radius:g} m on {length:g} m: {radius / length:.3g} of the length"
+            yield key, text, f"{_SPREAD[0]:g} to {_SPREAD[1]:g} of it: the radius or particulars.length"
     least, most = (share * length for share in _PROPELLER)
     if vehicle.propeller and not least <= vehicle.diameter <= most:
         text = f"{least:.3g} to {most:.3g} m: a hundredth to half of the length of {length:g} m"

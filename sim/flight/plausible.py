@@ -21,6 +21,7 @@ _STEEPEST = constant("steepest_wave")
 # Waves shorter than this part of the boat's length load it no more, and cost memory without bound.
 _SHORTEST = 0.01
 _DEEPEST = constant("deepest_sea")
+_HIGHEST = constant("highest_wave")
 # Faster than anything that keeps its hull wetted [m/s].
 _FASTEST = 100.0
 
@@ -97,11 +98,16 @@ def check_steepness(case: Case, height: float, length: float) -> None:
     Raises
     ------
     InputError
-        For a length of nothing, or waves steeper than any.
+        For a length of nothing, or longer than deep water allows, and for waves higher or steeper than any.
     """
     where = f"case {case.name}, key waves"
     if not length > 1e-6:
         raise InputError(where, f"waves of {length:.3g} m length", "a length or a period of waves of water")
+    if length > 2.0 * _DEEPEST:
+        allowed = f"{2.0 * _DEEPEST:g} m at most, twice the deepest sea: longer ones are no waves of deep water"
+        raise InputError(where, f"waves of {length:.4g} m length", allowed)
+    if height > _HIGHEST:
+        raise InputError(where, f"waves of {height:.4g} m height", f"{_HIGHEST:g} m at most, the highest ever measured")
     if height > _STEEPEST * length:
         wave = f"{height:.4g} m high and {length:.4g} m long: steepness {height / length:.3g}"
         raise InputError(where, wave, f"a steepness of {_STEEPEST:g} at most, at which waves break")

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sim.files.errors import InputError
 from sim.files.frames import Frame
@@ -36,6 +37,8 @@ class Series:
         self.data = data
         self.abscissa = abscissa
         self.smooth: dict[str, dict[str, Record]] = {}
+        self.rows: dict[tuple[str, str], NDArray[np.int_]] = {}
+        self.turned: set[str] = set()
 
     def __repr__(self) -> str:
         listed = "; ".join(f"{source}: {', '.join(records)}" for source, records in self.data.items())
@@ -48,6 +51,14 @@ class Series:
     def __getitem__(self, source: str) -> dict[str, Record]:
         """Channel -> record of a source; empty for one that has none."""
         return self.data.get(source, {})
+
+
+def place_of(series: Series, file: str, source: str, channel: str, at: int) -> str:
+    """File, row and series of a point, for messages; its time or path length where the row is not known."""
+    rows = series.rows.get((source, channel))
+    if rows is not None:
+        return f"{file}, row {int(rows[at])}, {source} {channel}"
+    return f"{file}, {source} {channel}, {series.abscissa} = {float(series[source][channel].abscissa[at]):.6g}"
 
 
 def _from_start(series: Series, channels: list[str]) -> Series:
@@ -75,6 +86,7 @@ def read_series(path: Path, abscissa: Literal["t", "s"], frame: Frame) -> Series
     """
     table = read_table(path, abscissa)
     data: dict[str, dict[str, Record]] = {}
+    places: dict[tuple[str, str], NDArray[np.int_]] = {}
     for (source, channel), rows in table.groupby(["source", "channel"], sort=False):
         along = rows[abscissa].to_numpy(dtype=float)
         if np.any(np.diff(along) <= 0.0):
@@ -86,7 +98,10 @@ def read_series(path: Path, abscissa: Literal["t", "s"], frame: Frame) -> Series
         sigma = rows["sigma"].to_numpy(dtype=float) if "sigma" in rows else None
         one = Record.read(str(channel), along, Written(value, str(units[0]), sigma))
         data.setdefault(str(source), {})[str(channel)] = one
-    return Series(data, abscissa)
+        places[(str(source), str(channel))] = rows.index.to_numpy(int) + 2
+    series = Series(data, abscissa)
+    series.rows, series.turned = places, {c for _, c in places if frame.sign(c) < 0.0}
+    return series
 
 
 def load_reference(case: Case, where: str) -> Series:
