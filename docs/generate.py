@@ -20,6 +20,7 @@ sys.path[:0] = [str(ROOT), str(ROOT / "docs")]
 
 import choices
 import evidence
+import recipes
 from reference_tables import axes_table, constants_table, key_tables, room_tables, table
 
 import ident
@@ -233,6 +234,7 @@ def main() -> int:
         ROOT / "docs" / "evidence.md": boats,
         ROOT / "docs" / "prediction.md": prediction,
         ROOT / "docs" / "errata.md": {"errata": errata()},
+        ROOT / "docs" / "readers.md": recipes.blocks(),
         ROOT / "docs" / "integration.md": {"steps": steps()},
         ROOT / "docs" / "terms.md": {"terms": term_table()},
         ROOT / "docs" / "checks.md": {"checks": check_table()},

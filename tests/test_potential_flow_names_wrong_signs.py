@@ -88,10 +88,10 @@ def test_the_munk_moment_of_a_spheroid_is_lambs():
     length, diameter = 6.0, 1.0
     mass = 1000.0 * np.pi / 6.0 * length * diameter**2
     along, across, _ = spheroid(length, diameter)
-    moment, measured = munk(Body(length, 1000.0, mass))
+    moment, measured = munk(Body(length, 1000.0, mass), rules()["munk"].limits)
     assert moment == pytest.approx((across - along) * mass / (500.0 * length**3), rel=1e-12)
     assert not measured
-    assert munk(Body(length, 1000.0, mass), 0.9 * mass, 0.05 * mass) == (
+    assert munk(Body(length, 1000.0, mass), rules()["munk"].limits, 0.9 * mass, 0.05 * mass) == (
         pytest.approx(0.85 * mass / (500.0 * length**3)),
         True,
     )

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from ident.captive import delay
 from ident.captive.channels import Channels, Timed, timed
+from ident.captive.left_behind import LeftBehind
 from ident.captive.motion import frequency_of, line_of, phase_is_known
 from ident.captive.oscillation import PHASES, Oscillation
 from ident.captive.quantities import HARMONICS, TAKEN
@@ -46,6 +47,7 @@ class Reduced:
     stated_hz : Frequency of an oscillation as stated, where the record's own was used instead.
     line : Frequency found in the record.
     delays : By how much channels come behind the motion, beyond what is stated.
+    left_behind : What a moment point that stays while the body moves would do, where nothing says that it goes along.
     """
 
     run_id: str
@@ -62,6 +64,7 @@ class Reduced:
     stated_hz: float | None = None
     line: Line | None = None
     delays: tuple[delay.Delay, ...] = ()
+    left_behind: tuple[LeftBehind, ...] = ()
 
     @property
     def runs(self) -> list[str]:

@@ -19,6 +19,7 @@ from ident.captive.dimensions import dimensional
 from ident.captive.foam_histories import foam_channels
 from ident.captive.grids import with_discretisation
 from ident.captive.histories import Reduced, reduce
+from ident.captive.left_behind import left_behind
 from ident.captive.moving import axes_of, moving_body, refuse_tables
 from ident.captive.oscillation import Oscillation, states
 from ident.captive.quantities import Column, owner
@@ -306,6 +307,11 @@ def _from_histories(
         run |= {"file": path.name, "row": 1, "reduction": one.words(), "converged": one.fit.converged}
         if rule.kind == "oscillatory":
             rows += states(values.oscillation(run), rule, frame, ittc, str(path))
+            # An OpenFOAM header says what becomes of its CofR.
+            if not source.moments_about and reader_of(path, source) != "openfoam":
+                size = abs(values.amplitude or rule.amplitude or 0.0)
+                behind = left_behind(str(rule.motion), size, values.harmonics, values.covariance, frame)
+                one = replace(one, left_behind=behind)
         else:
             rows.append(run)
         reduced.append(one)

@@ -169,13 +169,77 @@ def same_slope(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
                 slope, error = _slope(group, angle, output, body, widest)
                 if math.isfinite(slope):
                     slopes.append((words, group, slope, error))
-            yield from _compared(evidence, rule, output, angle, slopes)
+            yield from _compared(evidence, rule, output, angle, slopes, rule.limits["share"])
+
+
+# Rate -> loads that answer it, and whether symmetry leaves them nothing without it.
+_TURNS = {"r": (("Y", "N"), True), "q": (("Z", "M"), False), "p": (("K",), True)}
+
+
+def _turning(evidence: Evidence, rate: str, body: Body) -> list[tuple[str, pd.DataFrame]]:
+    """Runs with way on that turn about one axis and do nothing else, by how they were made: (words, runs).
+
+    A column ``turn`` has the rate times length over speed.
+    """
+    runs = evidence.runs
+    others = [m for m in _MOVING if m != rate]
+    alone = (runs[others].fillna(0.0) == 0.0).all(axis=1) & (runs[rate].fillna(0.0) != 0.0)
+    straight = (runs[["alpha", "beta"]].fillna(0.0).abs() < math.radians(0.5)).all(axis=1)
+    chosen = runs[alone & straight & runs["part"].isin(HULL) & (runs["U"].fillna(0.0) > 0.0)]
+    chosen = chosen.assign(turn=chosen[rate] * body.length / chosen["U"])
+    swung = chosen["run_id"].astype(str).str.contains(r"[+-]v$")
+    words = swung.map({True: "oscillations of ", False: "steady runs of "}) + together(chosen)
+    return [(str(name), group) for name, group in chosen.groupby(words, sort=False)]
+
+
+@check("between_tests")
+def same_rotation(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
+    """The load over a rate, from the rotating arm of each file and from oscillations: a radius that was a diameter."""
+    body = evidence.body
+    if body is None:
+        return
+    for rate, (outputs, odd) in _TURNS.items():
+        groups = _turning(evidence, rate, body)
+        if len(groups) < 2:
+            continue
+        for output in outputs:
+            reach = [float(g["turn"].abs()[kept(g, output)].max()) for _, g in groups]
+            widest = min((r for r in reach if r > 0.0), default=0.0)
+            slopes: list[tuple[str, pd.DataFrame, float, float]] = []
+            for words, group in groups:
+                found, error = _slope_of_turn(group, output, body, 1.05 * widest, odd)
+                if math.isfinite(found):
+                    slopes.append((words, group, found, error))
+            yield from _compared(evidence, rule, output, rate, slopes, rule.limits["turn"])
+
+
+def _slope_of_turn(group: pd.DataFrame, output: str, body: Body, widest: float, odd: bool) -> tuple[float, float]:
+    """Slope of a load over the turn, prime form with 1/2 rho U^2, and its standard error; NaN where there is none."""
+    near = group[kept(group, output) & (group["turn"].abs() <= widest)]
+    x = near["turn"].to_numpy(float)
+    size = 0.5 * body.density * near["U"].to_numpy(float) ** 2 * body.length ** (2 if output in "XYZ" else 3)
+    both = x.size > 0 and x.min() < 0.0 < x.max()
+    if not x.size or not (odd or both):
+        return math.nan, math.nan
+    design = np.column_stack([np.ones(x.size), x]) if both and x.size > 2 else x[:, None]
+    inverse = np.linalg.pinv(design)
+    y = near[output].to_numpy(float) / size
+    found = inverse[-1] @ y
+    left = y - design @ (inverse @ y)
+    spread = math.sqrt(float(left @ left) / (x.size - design.shape[1])) if x.size > design.shape[1] else 0.0
+    sigma = np.maximum(near[f"s_{output}"].fillna(0.0).to_numpy(float) / size, spread)
+    return float(found), float(np.sqrt((inverse[-1] ** 2) @ sigma**2))
 
 
 def _compared(
-    evidence: Evidence, rule: Rule, output: str, angle: str, slopes: list[tuple[str, pd.DataFrame, float, float]]
+    evidence: Evidence,
+    rule: Rule,
+    output: str,
+    angle: str,
+    slopes: list[tuple[str, pd.DataFrame, float, float]],
+    share: float,
 ) -> Iterator[Finding]:
-    """Slopes against that of the most runs."""
+    """Slopes against that of the most runs, which differ by more than a share and their errors."""
     if len(slopes) < 2:
         return
     base = max(slopes, key=lambda one: (one[0].startswith("steady"), len(one[1])))
@@ -185,7 +249,7 @@ def _compared(
             continue
         off = abs(slope - base[2])
         size = max(abs(slope), abs(base[2]))
-        if off <= rule.limits["share"] * size or off <= rule.limits["errors"] * math.hypot(error, base[3]):
+        if off <= share * size or off <= rule.limits["errors"] * math.hypot(error, base[3]):
             continue
         what = f"{output} over {angle} is {slope:.3g} (prime form, per radian) in {words}, {base[2]:.3g} in {base[0]}"
         what += f": a factor {slope / base[2]:.2g}" if base[2] else ""

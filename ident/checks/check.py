@@ -30,8 +30,11 @@ from ident.checks import physics as checks_physics
 from ident.checks import planes as checks_planes
 from ident.checks import possible as checks_possible
 from ident.checks import potential as checks_potential
+from ident.checks import proportions as checks_proportions
+from ident.checks import resistance as checks_resistance
 from ident.checks import runs as checks_runs
 from ident.checks import tables as checks_tables
+from ident.checks import zeros as checks_zeros
 from ident.checks.findings import SEVERITIES, Body, Evidence, Finding, registered, rules
 from ident.checks.summary import counted, cut, lines
 from ident.identification.identify import Identification, identify
@@ -55,8 +58,11 @@ _MODULES = (
     checks_planes,
     checks_possible,
     checks_potential,
+    checks_proportions,
+    checks_resistance,
     checks_runs,
     checks_tables,
+    checks_zeros,
 )
 _COLOURS = {"error": "red", "warning": "yellow", "info": "cyan"}
 

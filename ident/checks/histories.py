@@ -148,3 +148,21 @@ def behind_the_motion(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
                 size = f"{abs(late.seconds):.3g} +- {late.stderr:.1g} s"
                 what = f"run {one.run_id}: {late.what} {size} {side} the displacement"
                 yield rule.finding(one.file, [], late.what.removeprefix("the loads ").split(), what)
+
+
+@check("moment_point")
+def point_that_may_stay(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
+    """Moments of a body that moves along an axis, where nothing says whether their point goes with it."""
+    for one in evidence.histories:
+        for arm in one.left_behind:
+            verdict = arm.verdict(rule.limits["errors"])
+            if abs(arm.in_phase) <= rule.limits["share"] * arm.swing or verdict == "goes":
+                continue
+            what = f"a moment point that stays while the body moves in {arm.motion} puts {arm.force} times the "
+            what += f"displacement into {arm.moment}, {abs(arm.in_phase):.3g} N m of {arm.swing:.3g}; "
+            if verdict:
+                what += f"its third harmonic says that it does: {arm.shown:.3g} of {arm.third:.3g} N m"
+            else:
+                what += "nothing says that it goes along, and the record does not show it"
+            asked = "warning" if abs(arm.in_phase) > rule.limits["asked"] * arm.swing else "info"
+            yield rule.finding(one.file, [], [arm.moment], what, "" if verdict else asked)

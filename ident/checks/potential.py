@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from itertools import combinations
 
 import numpy as np
@@ -24,17 +24,21 @@ _PLANES = (
 )
 
 
-def munk(body: Body, across: float | None = None, along: float = 0.0) -> tuple[float, bool]:
+def munk(
+    body: Body, limits: Mapping[str, float], across: float | None = None, along: float = 0.0
+) -> tuple[float, bool]:
     """Munk moment over the angle, (m_across - m_along) in prime form, and whether it rests on measured added mass.
 
     Parameters
     ----------
     body : For length, density and displaced mass.
+    limits : Of the check ``munk``: ``lightest`` and ``heaviest``, shares of the body's mass between which a measured
+        added mass is believed.
     across, along : Measured added masses [kg]; without the first, those of the spheroid of the same volume and length.
     """
     unit = 0.5 * body.density * body.length**3
     assert body.mass is not None
-    if across is not None and 0.3 * body.mass < across < 2.0 * body.mass:
+    if across is not None and limits["lightest"] * body.mass < across < limits["heaviest"] * body.mass:
         return (across - along) / unit, True
     volume = body.mass / body.density
     diameter = math.sqrt(6.0 * volume / (math.pi * body.length))
@@ -52,10 +56,17 @@ def moments_against_the_munk_moment(evidence: Evidence, rule: Rule) -> Iterator[
         return
     masses = {a: mass for _, a, _, mass in apparent_inertia(evidence)}
     for test, angle, force, moment, sense, across, velocity in _PLANES:
-        potential, measured = munk(body, masses.get(across), max(masses.get("udot", 0.0), 0.0))
+        potential, measured = munk(body, rule.limits, masses.get(across), max(masses.get("udot", 0.0), 0.0))
         certain = rule.limits["measured" if measured else "spheroid"] * potential
         for file, rows, lift, turn in _slopes(evidence, test, angle, force, moment, velocity):
             away = sense * turn
+            most = rule.limits["most"] * potential + rule.limits["bow"] * abs(lift)
+            if measured and away > most:
+                what = f"{moment} over {angle} is {turn:.3g} (prime form, per radian) with {force} of {lift:.3g}: more "
+                what += f"than potential flow ({sense * potential:.3g}) and a part of {force} at the bow turn it by; "
+                what += "moment point, or the unit of speed or moment?"
+                yield rule.finding(file, rows, [moment, angle], what, "warning")
+                continue
             if away >= certain - rule.limits["stern"] * abs(lift) - rule.limits["share"] * abs(turn):
                 continue
             what = (
@@ -78,13 +89,13 @@ def _slopes(
         if math.isfinite(lift) and math.isfinite(turn):
             yield str(file), rows_of(group), lift, turn
     if of_test.empty and evidence.constants is not None and evidence.vehicle is not None:
-        known = _constants(evidence)
+        known = hull_constants(evidence)
         names = [next((n for n in (f"{o}_{velocity}", f"{o}_u{velocity}") if n in known), "") for o in (force, moment)]
         if all(names):
             yield "published coefficients", [], known[names[0]][0], known[names[1]][0]
 
 
-def _constants(evidence: Evidence) -> dict[str, tuple[float, float]]:
+def hull_constants(evidence: Evidence) -> dict[str, tuple[float, float]]:
     """Coefficients of the hull in 1/2 rho L^n with their standard errors."""
     assert evidence.constants is not None
     assert evidence.vehicle is not None
@@ -97,12 +108,39 @@ def _constants(evidence: Evidence) -> dict[str, tuple[float, float]]:
     }
 
 
+# Force, moment, acceleration across, sense of the lever: N = x Y, M = -x Z.
+_ACROSS = (("Y", "N", "vdot", 1.0), ("Z", "M", "wdot", -1.0))
+
+
+@check("added_lever")
+def centre_of_the_added_mass(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
+    """N_vdot over Y_vdot, M_wdot over Z_wdot: the water that is moved across has its centre near the buoyancy's."""
+    if evidence.constants is None or evidence.vehicle is None:
+        return
+    known, particulars = hull_constants(evidence), evidence.vehicle.particulars
+    centre = particulars.centre_of_buoyancy.value[0] / particulars.length.value
+    for force, moment, acceleration, sense in _ACROSS:
+        names = [f"{moment}_{acceleration}", f"{force}_{acceleration}"]
+        if not all(n in known for n in names) or not known[names[1]][0] < 0.0:
+            continue
+        (turn, error), (push, _) = (known[n] for n in names)
+        lever = sense * turn / push
+        off = abs(lever - centre)
+        if off <= max(rule.limits["share"], rule.limits["errors"] * error / abs(push)):
+            continue
+        what = f"{names[0]} = {turn:.3g} with {names[1]} = {push:.3g}: the added mass would have its centre at "
+        what += f"x = {lever:.2g} L, and the centre of buoyancy is at {centre:.2g} L; moment point, or the unit or "
+        what += f"sign of {moment}?"
+        far = off > rule.limits["far"]
+        yield rule.finding(*printed_place(evidence.runs, names), names, what, "error" if far else "")
+
+
 @check("reciprocal")
 def added_inertia_both_ways(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
     """N_vdot and Y_rdot are one number, as M_wdot and Z_qdot are: the energy of the water has one value."""
     if evidence.constants is None or evidence.vehicle is None:
         return
-    known = _constants(evidence)
+    known = hull_constants(evidence)
     names = {(i, j): f"{OUTPUTS[i]}_{ACCELERATIONS[j]}" for i in range(6) for j in range(6)}
     for i, j in combinations(range(6), 2):
         pair = [names[i, j], names[j, i]]
@@ -123,7 +161,7 @@ def turns_pushed_at_the_stern(evidence: Evidence, rule: Rule) -> Iterator[Findin
     """Y_r below or Z_q above zero: what acts on a turning hull acts behind its middle."""
     if evidence.constants is None or evidence.vehicle is None:
         return
-    known = _constants(evidence)
+    known = hull_constants(evidence)
     for force, rate, velocity, sense in (("Y", "r", "v", 1.0), ("Z", "q", "w", -1.0)):
         turn = next((n for n in (f"{force}_u{rate}", f"{force}_{rate}") if n in known), "")
         lift = next((n for n in (f"{force}_{velocity}", f"{force}_u{velocity}") if n in known), "")

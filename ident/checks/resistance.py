@@ -1,0 +1,95 @@
+"""Checks of the resistance: against the friction of a plate, and straight ahead in every file."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+import pandas as pd
+
+from ident.checks.findings import HULL, Body, Evidence, Finding, Rule, check, kept, prime, rows_of, together
+from sim.boat.catalogue import ACCELERATIONS
+from sim.files.constants import constant
+from sim.hull.slender import friction
+
+_TESTS = ("towing", "drift_horizontal", "drift_vertical")
+# Degrees of drift or incidence within which X is the resistance.
+_AHEAD = math.radians(2.6)
+
+
+def straight_ahead(runs: pd.DataFrame, widest: float = _AHEAD) -> pd.DataFrame:
+    """Runs of the hull without drift, incidence, turn, acceleration or revolutions, whose X is used."""
+    still = (runs[["p", "q", "r", *ACCELERATIONS, "n"]].fillna(0.0) == 0.0).all(axis=1)
+    ahead = (runs[["alpha", "beta"]].fillna(0.0).abs() <= widest).all(axis=1)
+    plane = runs["plane"].fillna(0.0) == 0.0
+    moving = runs["U"].fillna(0.0) > 0.0
+    return runs[runs["test"].isin(_TESTS) & runs["part"].isin(HULL) & still & ahead & plane & moving & kept(runs, "X")]
+
+
+def wetted_surface(body: Body) -> float:
+    """Surface of the prolate spheroid of the body's length and volume, about the least there is [m^2].
+
+    Exact for a slender one, pi^2/4 L d; a hull with a parallel body, a sail and planes has more.
+    """
+    assert body.mass is not None
+    volume = body.mass / body.density
+    diameter = math.sqrt(6.0 * volume / (math.pi * body.length))
+    return 0.25 * math.pi**2 * body.length * diameter
+
+
+@check("friction")
+def resistance_over_friction(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
+    """Resistance below that of a flat plate of the same surface, or many times it, at the tested size."""
+    body, campaign = evidence.body, evidence.campaign
+    if body is None or body.mass is None or campaign is None:
+        return
+    if campaign.header.fluid.density_kgpm3 < rule.limits["water"]:
+        return
+    limits, ratio = rule.limits, campaign.header.scale.ratio
+    runs = straight_ahead(evidence.runs)
+    for file, group in runs.groupby(together(runs), sort=False):
+        reynolds = (group["U"] * body.length / constant("sea_water_viscosity") / ratio**1.5).to_numpy(float)
+        if not (reynolds > limits["reynolds"]).all():
+            continue
+        plate = np.array([friction(re) for re in reynolds])
+        # A small model may keep its boundary layer laminar.
+        least = np.where(reynolds < limits["turbulent"], limits["blasius"] / np.sqrt(reynolds), limits["least"] * plate)
+        resistance = -prime(group, "X", body).to_numpy(float) * body.length**2 / wetted_surface(body)
+        share = resistance / plate
+        low, high = bool((resistance < least).all()), bool((share > limits["most"]).all())
+        # The sign is the check `size`'s.
+        if not (low or high) or not (resistance > 0.0).all():
+            continue
+        words = "less than the friction of a flat plate of that surface" if low else "more than a streamlined boat has"
+        what = f"X is {float(np.median(share)):.2g} times the ITTC friction of the least surface of that length and "
+        what += f"volume, {words}: the unit of speed or X, scale, density, or thrust in X?"
+        yield rule.finding(str(file), rows_of(group), ["X", "U"], what, "" if low else "warning")
+
+
+@check("between_tests")
+def same_resistance(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
+    """X straight ahead, from the towing test and from drift tests: what differs is a speed, a unit, a thrust."""
+    body = evidence.body
+    if body is None:
+        return
+    runs = straight_ahead(evidence.runs)
+    values: list[tuple[str, str, pd.DataFrame, float]] = []
+    for key, group in runs.groupby([together(runs), "test"], sort=False):
+        file, test = str(key[0]), str(key[1])
+        values.append((file, test, group, float(prime(group, "X", body).median())))
+    if len(values) < 2:
+        return
+    base = max(values, key=lambda one: (one[1] == "towing", len(one[2])))
+    for file, test, group, value in values:
+        size = max(abs(value), abs(base[3]))
+        if not size > 0.0 or abs(value - base[3]) <= rule.limits["share"] * size:
+            continue
+        error = (prime(group.assign(X=group["s_X"]), "X", body)).median()
+        if abs(value - base[3]) <= rule.limits["errors"] * (error if math.isfinite(error) else 0.0):
+            continue
+        factor = value / base[3] if base[3] else math.inf
+        what = f"X straight ahead is {value:.3g} (prime form) in {test} of {file}, {base[3]:.3g} in {base[1]} of "
+        what += f"{base[0]}: a factor {factor:.2g}; the unit of speed or X?"
+        far = not 1.0 / rule.limits["factor"] < factor < rule.limits["factor"]
+        yield rule.finding(file, rows_of(group), ["X", "U"], what, "error" if far else "")

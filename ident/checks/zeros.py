@@ -1,0 +1,130 @@
+"""Checks for zero readings left in the loads: constants that neither symmetry nor the square of the speed allows."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+import pandas as pd
+
+from ident.checks.findings import (
+    HULL,
+    Array,
+    Body,
+    Evidence,
+    Finding,
+    Rule,
+    check,
+    declared,
+    dynamic,
+    kept,
+    milder,
+    rows_of,
+    together,
+)
+from ident.checks.resistance import straight_ahead
+from sim.boat.catalogue import ACCELERATIONS
+from sim.files.constants import constant
+from sim.hull.slender import friction
+
+# Test -> motion that alone makes the loads that symmetry forbids without it.
+_ODD = {"drift_horizontal": "beta", "rotating_arm": "r"}
+_STATES = ("alpha", "beta", "p", "q", "r", *ACCELERATIONS)
+
+
+@check("zero_reading")
+def constant_beside_an_odd_load(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
+    """Y, K, N = b x + c x|x| + d x^3 in prime form, and a constant load beside them."""
+    body = evidence.body
+    if body is None:
+        return
+    for test, motion in _ODD.items():
+        others = [s for s in _STATES if s != motion]
+        runs = evidence.runs
+        alone = (runs[others].fillna(0.0).abs() < math.radians(0.1)).all(axis=1)
+        runs = runs[(runs["test"] == test) & alone & runs["part"].isin(HULL) & (runs["U"].fillna(0.0) > 0.0)]
+        runs = runs.assign(**{motion: runs[motion].fillna(0.0)})
+        for file, group in runs.groupby(together(runs), sort=False):
+            for output in "YN":
+                found = _left(group[kept(group, output)], motion, output, body, rule)
+                if found:
+                    known = bool(declared(evidence, group).all())
+                    yield rule.finding(str(file), rows_of(group), [output], found, milder(rule, known))
+
+
+def _left(group: pd.DataFrame, motion: str, output: str, body: Body, rule: Rule) -> str:
+    """What was found of a constant in an odd load, in words; nothing where there is none, or too few runs."""
+    x = group[motion].to_numpy(float) * (body.length / group["U"].to_numpy(float) if motion == "r" else 1.0)
+    sizes = np.unique(np.abs(x).round(6))
+    # Both sides show a constant by themselves; one side only beside a curve that leaves degrees of freedom.
+    sides = x.size > 0 and x.min() < 0.0 < x.max()
+    if x.size < 5 or (sizes.size < 5 and not (sides and sizes.size >= 2)):
+        return ""
+    load, pressure = group[output].to_numpy(float), dynamic(group, body).to_numpy(float)
+    curve = [x, x * np.abs(x), x**3][: max(1, min(3, sizes.size - 2))]
+    design = np.column_stack([*curve, 1.0 / pressure])
+    error = group[f"s_{output}"].fillna(0.0).to_numpy(float) / pressure
+    value, sigma = _last(design, load / pressure, error)
+    largest = float(np.abs(load).max())
+    if not abs(value) > max(rule.limits["share"] * largest, rule.limits["errors"] * sigma):
+        return ""
+    return (
+        f"{output} has a constant of {value:.4g} +- {sigma:.2g} N{'' if output in 'XYZ' else ' m'} beside what grows "
+        f"with {motion}, {100.0 * abs(value) / largest:.2g} % of the largest"
+    )
+
+
+def _last(design: Array, values: Array, error: Array) -> tuple[float, float]:
+    """The last unknown of a least-squares fit and its standard error, from stated errors and scatter."""
+    scale = np.abs(design).max(axis=0)
+    if not (np.isfinite(design).all() and np.isfinite(values).all() and (scale > 0.0).all()):
+        return 0.0, math.inf
+    inverse = np.linalg.pinv(design / scale)
+    found = inverse @ values
+    left = values - design / scale @ found
+    free = len(values) - design.shape[1]
+    spread = math.sqrt(float(left @ left) / free) if free > 0 else math.inf
+    sigma = np.maximum(error, spread)
+    return float(found[-1] / scale[-1]), float(np.sqrt((inverse[-1] ** 2) @ sigma**2) / scale[-1])
+
+
+@check("zero_reading")
+def constant_beside_the_square_of_the_speed(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
+    """X, Z and M straight ahead at several speeds: c U^2, X with the friction line, and a constant beside it."""
+    body, campaign = evidence.body, evidence.campaign
+    if body is None or campaign is None:
+        return
+    runs = straight_ahead(evidence.runs, math.radians(0.1))
+    # Waves that the boat makes do not go with the square of its speed.
+    runs = runs[runs["D0"].fillna(0.0) > rule.limits["deep"] * body.length]
+    for key, group in runs.groupby([together(runs), runs["D0"].round(6)], sort=False):
+        speed = group["U"].to_numpy(float)
+        if np.unique(speed.round(6)).size < 3 or speed.max() < rule.limits["speeds"] * speed.min():
+            continue
+        for output in "XZM":
+            given = group[kept(group, output)]
+            found = _beside_square(given, output, body, campaign.header.scale.ratio, rule) if len(given) > 2 else ""
+            if found:
+                yield rule.finding(str(key[0]), rows_of(given), [output, "U"], found)
+
+
+def _beside_square(group: pd.DataFrame, output: str, body: Body, ratio: float, rule: Rule) -> str:
+    speed, load = group["U"].to_numpy(float), group[output].to_numpy(float)
+    reynolds = speed * body.length / constant("sea_water_viscosity") / ratio**1.5
+    plate = np.array([friction(max(re, 1e3)) for re in reynolds])
+    error = group[f"s_{output}"].fillna(0.0).to_numpy(float) / speed**2
+    # A resistance is between the friction line and the square of the speed: a constant is one beside both.
+    found = []
+    for growth in (np.ones(speed.size), plate)[: 2 if output == "X" else 1]:
+        found.append(_last(np.column_stack([growth, 1.0 / speed**2]), load / speed**2, error))
+    value, sigma = min(found, key=lambda one: abs(one[0]))
+    smallest = float(np.abs(load[speed == speed.min()]).max())
+    one_sign = all(v * value > 0.0 for v, _ in found)
+    if not one_sign or not abs(value) > max(rule.limits["least"] * smallest, rule.limits["errors"] * sigma):
+        return ""
+    unit = "N" if output in "XYZ" else "N m"
+    return (
+        f"{output} straight ahead has a constant of {value:.4g} +- {sigma:.2g} {unit} beside what grows with U^2, "
+        f"{100.0 * abs(value) / smallest:.3g} % of the load at the lowest speed"
+    )
