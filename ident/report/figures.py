@@ -1,7 +1,7 @@
 """Figures of the coefficient report: every tabulated value against its axes.
 
 One figure a group and part. Where a coefficient is tabulated over speed and depth a row
-of panels is one coefficient, a column one speed and a line one depth, as the source plots
+of panels is one coefficient to one scale, a column one speed and a line one depth, as the source plots
 them. Colour is the quality word, in all figures the same; hollow points are mirror images.
 """
 
@@ -202,8 +202,7 @@ def _draw_curve(axes: Axes, panel: Panel, lines: dict[str, list[float]], colours
         axes.axhline(0.0, color="#aaaaaa", linewidth=0.7, zorder=1)
     scientific(axes.xaxis, axes.yaxis)
     # Ticks are most of the time of a panel.
-    axes.locator_params(axis="x", nbins=6)
-    axes.locator_params(axis="y", nbins=5)
+    axes.locator_params(axis="both", nbins=4)
 
 
 def _draw_bars(axes: Axes, panel: Panel, colours: dict[str, str]) -> None:
@@ -259,17 +258,27 @@ def _grid(panels: list[Panel]) -> tuple[int, int, list[tuple[int, int]]]:
 
 
 def _share_labels(grid: Any, panels: list[Panel], places: list[tuple[int, int]]) -> None:
-    """Label the abscissa once a column of speeds, the sections once a row."""
+    """Label the abscissa once a column of speeds, the ordinate (to one scale) and the sections once a row."""
     lowest: dict[int, int] = {}
-    for row, column in places:
-        lowest[column] = max(row, lowest.get(column, 0))
+    rows: dict[int, list[Axes]] = {}
     for panel, (row, column) in zip(panels, places, strict=True):
-        axes = grid[row, column]
-        if panel.column is not None and row < lowest[column]:
-            axes.set_xlabel("")
-            axes.tick_params(labelbottom=False)
+        lowest[column] = max(row, lowest.get(column, 0))
+        if panel.column is not None:
+            rows.setdefault(row, []).append(grid[row, column])
         if panel.labels == "part" and column:
+            grid[row, column].tick_params(labelleft=False)
+    for panel, (row, column) in zip(panels, places, strict=True):
+        if panel.column is not None and row < lowest[column]:
+            grid[row, column].set_xlabel("")
+            grid[row, column].tick_params(labelbottom=False)
+    for first, *others in rows.values():
+        limits = [axes.get_ylim() for axes in (first, *others)]
+        first.set_ylim(min(low for low, _ in limits), max(high for _, high in limits))
+        for axes in others:
+            axes.set_ylim(first.get_ylim())
+            axes.set_ylabel("")
             axes.tick_params(labelleft=False)
+            axes.yaxis.get_offset_text().set_visible(False)
 
 
 def _frame(rows: int, columns: int, panels: list[Panel], entries: int) -> tuple[Figure, Any]:
@@ -279,7 +288,7 @@ def _frame(rows: int, columns: int, panels: list[Panel], entries: int) -> tuple[
     # Fixed margins: an automatic layout costs more time than all the drawing.
     bars = max((len(p.rows) for p in panels if p.x is None), default=0)
     left, between = (1.4, 1.3) if bars > 1 else (0.75, 0.75)
-    if all(p.labels == "part" for p in panels):
+    if all(p.labels == "part" for p in panels) or panels[0].column is not None:
         between = 0.3
     gap = 0.45 if panels[0].column is not None else 0.8
     tall, top, bottom = max(1.75, 0.24 * bars), 0.75, 0.65 + 0.22 * -(-entries // _LEGEND_COLUMNS)

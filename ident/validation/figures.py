@@ -71,6 +71,8 @@ _SHOWN = {
 _DEFAULT = ("psi", "theta", "phi", "u", "D0", "r")
 # Room below the panels for the abscissa and two lines of legend [inches].
 _LEGEND = 0.95
+# Between rows that have the abscissa in common, with room for a line on top of a panel [inches].
+_SHARED_GAP = 0.3
 # Columns of the legend of planes, and a row of it as a part of the panel's height.
 _LEGEND_COLUMNS, _ROW_OF_LEGEND = 3, 0.12
 
@@ -175,6 +177,19 @@ def dress(axis: Any, x: str, y: str) -> None:
     axis.grid(alpha=0.3)
 
 
+def share_abscissa(axes: Any, columns: int) -> None:
+    """Number and name the abscissa that panels have in common below the lowest of each column, with few ticks.
+
+    Ticks are most of the time of a panel.
+    """
+    for axis in axes:
+        axis.locator_params(axis="x", nbins=5)
+        axis.locator_params(axis="y", nbins=6)
+    for axis in axes[:-columns]:
+        axis.set_xlabel("")
+        axis.tick_params(labelbottom=False)
+
+
 def _track(done: FlownCase, axis: Any) -> None:
     """The path over ground, north up, both axes to one scale."""
     for source in _sources(done):
@@ -268,17 +283,18 @@ def _draw(done: FlownCase, bands: Bands | None) -> tuple[Any, Any]:
     planes = [c for c in done.simulation.columns if c not in CHANNELS and c not in _NO_PLANES]
     panels = len(channels) + bool(planes)
     rows, columns = (panels + 1) // 2, min(2, panels)
-    figure = blank(11, 2.7 * rows + 0.8)
-    place_panels(figure, rows, columns, Margins(bottom=_LEGEND))
-    axes = figure.subplots(rows, columns)
-    for channel, axis in zip(channels, np.ravel(axes), strict=False):
+    figure = blank(11, 2.4 * rows + 1.1)
+    place_panels(figure, rows, columns, Margins(bottom=_LEGEND, gap=_SHARED_GAP))
+    axes = np.ravel(figure.subplots(rows, columns))
+    for channel, axis in zip(channels, axes, strict=False):
         _series(done, channel, axis, bands)
         _checks(done, channel, axis)
     if planes:
-        _deflections(done, planes, np.ravel(axes)[len(channels)])
-    for axis in np.ravel(axes)[panels:]:
+        _deflections(done, planes, axes[len(channels)])
+    for axis in axes[panels:]:
         axis.set_visible(False)
-    return figure, np.ravel(axes)[0]
+    share_abscissa(axes[:panels], columns)
+    return figure, axes[0]
 
 
 def _over_time(done: FlownCase, channel: str, axis: Any) -> None:
