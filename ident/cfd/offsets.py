@@ -23,6 +23,8 @@ _STATIONS = 61
 _ANGLES = np.arange(0.0, 180.5, 15.0)
 # Relative: length against the one that is stated; port against starboard; volume of the offsets against the surface's.
 _LENGTH, _SYMMETRY, _VOLUME = 0.01, 0.01, 0.01
+# Of the length: how far behind the middle a centre of volume is told.
+_MIDDLE = 0.005
 # Of the length: how near to an end the last section is cut.
 _END = 1e-4
 
@@ -48,6 +50,11 @@ class Offsets:
     surface_volume: float
     centre: float
     source: str
+
+    @property
+    def stern_first(self) -> bool:
+        """Whether the centre of volume lies behind the middle, as that of a submarine read from its tail does."""
+        return self.centre > (0.5 + _MIDDLE) * float(self.x[-1] - self.x[0])
 
     def to_dict(self) -> dict[str, object]:
         """The offsets for a program to read."""
@@ -136,6 +143,7 @@ def offsets_of(
     if len(members) > 1:
         wrong = f"{len(members)} closed bodies: {', '.join('+'.join(sorted(m)) for m in members)}"[:200]
         raise InputError(str(surface), wrong, "the hull alone; sail and planes are parts of the geometry file")
+    _about_the_axis(body, surface)
     nose, tail = float(body.vertices[:, 0].max()), float(body.vertices[:, 0].min())
     x = 0.5 * (1.0 - np.cos(np.linspace(0.0, np.pi, _STATIONS))) * (nose - tail)
     radius = np.stack([_radii(body, nose - min(max(s, _END * x[-1]), (1.0 - _END) * x[-1]), surface) for s in x])
@@ -154,6 +162,14 @@ def _right_length(surface: Path, length: float, wanted: float, unit: str) -> Non
     fits = [u for u, size in UNITS.items() if abs(length / UNITS[unit] * size / wanted - 1.0) <= _LENGTH]
     text = f"--unit {fits[0]}" if fits else f"a surface as long as --length says, {wanted:g} m"
     raise InputError(str(surface), f"{length:.6g} m long with --unit {unit}", text)
+
+
+def _about_the_axis(body: Mesh, surface: Path) -> None:
+    """Refuse a hull whose middle plane is not y = 0."""
+    port, starboard = float(body.vertices[:, 1].min()), float(body.vertices[:, 1].max())
+    if abs(port + starboard) > _SYMMETRY * (starboard - port):
+        wrong = f"port and starboard differ: its sides are at y = {port:.3g} and {starboard:.3g} m"
+        raise InputError(str(surface), wrong, "a hull that is the same to both sides of y = 0")
 
 
 def _radii(body: Mesh, at: float, surface: Path) -> Array:

@@ -24,6 +24,7 @@ from ident.checks import axes as checks_axes
 from ident.checks import coefficients as checks_coefficients
 from ident.checks import copies as checks_copies
 from ident.checks import fitted as checks_fitted
+from ident.checks import geometry as checks_geometry
 from ident.checks import histories as checks_histories
 from ident.checks import lines as checks_lines
 from ident.checks import physics as checks_physics
@@ -53,6 +54,7 @@ _MODULES = (
     checks_copies,
     checks_fitted,
     checks_histories,
+    checks_geometry,
     checks_lines,
     checks_physics,
     checks_planes,

@@ -81,6 +81,9 @@ def offsets(
     written = hull.write(out)
     if json_path != "-":
         click.echo("\n".join(path.as_posix() for path in written))
-        click.echo(f"volume {hull.volume:.5g} m3, of the surface {hull.surface_volume:.5g} m3")
+        centre = f"its centre {hull.centre:.4g} m behind the nose"
+        click.echo(f"volume {hull.volume:.5g} m3, of the surface {hull.surface_volume:.5g} m3, {centre}")
+        if hull.stern_first:
+            click.echo(f"warning: more of the volume is aft of the middle than before it: is --x {x} right?", err=True)
     if json_path:
         emit(hull.to_dict() | {"files": [path.as_posix() for path in written]}, json_path)

@@ -13,7 +13,7 @@ from sim.boat.vehicle import Vehicle
 from sim.files.constants import constant
 from sim.files.errors import InputError
 from sim.hull.derivatives import Derivative, derivatives
-from sim.hull.slender import Lines, friction, hull_added_mass, lines
+from sim.hull.slender import Lines, NoHull, friction, hull_added_mass, lines
 
 Array = NDArray[np.float64]
 
@@ -51,12 +51,18 @@ def from_lines(draft: Draft, given: Given) -> str:
     NotApplicable
         Without a hull's lines; for a published set, whose authors have said what they leave out, unless its campaign
         asks for it; when runs give all.
+    InputError
+        For lines that cannot be read.
     """
     if draft.rows["origin"].eq("published").any() and not given.complete:
         raise NotApplicable("the set is as its authors give it")
     try:
-        by_part = draft.where(["[YZ]_d*"]).any()
-        known, hull = derivatives(draft.vehicle, with_fins=not by_part), lines(draft.vehicle)
+        hull = lines(draft.vehicle)
+    except NoHull as error:
+        raise NotApplicable(str(error)) from error
+    by_part = draft.where(["[YZ]_d*"]).any()
+    try:
+        known = derivatives(draft.vehicle, with_fins=not by_part)
     except InputError as error:
         raise NotApplicable(str(error)) from error
     named = {t.name: t for t in vehicle_terms(draft.vehicle)}

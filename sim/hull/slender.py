@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from sim.boat.vehicle import Vehicle
 from sim.files.constants import constant
 from sim.files.errors import InputError
+from sim.files.schema import checked
 from sim.files.toml_files import read_toml
 from sim.hull.integral import trapezoid
 from sim.hull.surface import Geometry, hull_of
@@ -28,6 +29,10 @@ Array = NDArray[np.float64]
 _SECTIONS = 800
 # Hopkins (1951): station at which potential flow ends, over the length and over the station of steepest decrease.
 _OF_LENGTH, _OF_STEEPEST = constant("potential_flow_ends_length"), constant("potential_flow_ends_steepest")
+
+
+class NoHull(InputError):
+    """A vehicle without a geometry file, or one without a hull in it: its lines are not known."""
 
 
 @dataclass(frozen=True)
@@ -63,6 +68,11 @@ class Lines:
         return float(-trapezoid(self.area, self.x))
 
     @property
+    def centre(self) -> float:
+        """Centre of volume, forward of the body origin [m]."""
+        return float(-trapezoid(self.area * self.x, self.x)) / self.volume
+
+    @property
     def wetted(self) -> float:
         """Wetted surface, the slope of the sections left out as in a slender body [m^2]."""
         return float(-trapezoid(self.girth, self.x))
@@ -73,13 +83,17 @@ def geometry_of(vehicle: Vehicle) -> tuple[Geometry, Path]:
 
     Raises
     ------
-    InputError
+    NoHull
         Without one.
+    InputError
+        For a file that is no geometry file, or whose frame is left-handed.
     """
     if vehicle.geometry is None:
-        raise InputError(f"vehicle {vehicle.name}", "no geometry file", "key geometry, with the hull's offsets")
+        raise NoHull(f"vehicle {vehicle.name}", "no geometry file", "key geometry, with the hull's offsets")
     data, where = read_toml(vehicle.geometry, "vehicles")
-    return Geometry.model_validate(data), Path(where).parent
+    geometry = checked(Geometry, data, where)
+    geometry.frame.declared(f"{where}, key frame")
+    return geometry, Path(where).parent
 
 
 def lines(vehicle: Vehicle) -> Lines:
@@ -87,13 +101,15 @@ def lines(vehicle: Vehicle) -> Lines:
 
     Raises
     ------
-    InputError
+    NoHull
         Without a geometry file, or a hull in it.
+    InputError
+        For a geometry file or offsets that cannot be read.
     """
     geometry, folder = geometry_of(vehicle)
     part = next((p for p in geometry.parts if p.kind == "hull"), None)
     if part is None:
-        raise InputError(str(vehicle.geometry), "no hull", "a part of kind hull")
+        raise NoHull(str(vehicle.geometry), "no hull", "a part of kind hull")
     hull = hull_of(folder / part.offsets)
     # Closer where the sections change, at the ends.
     x = hull.x[0] + (hull.x[-1] - hull.x[0]) * 0.5 * (1.0 - np.cos(np.linspace(0.0, np.pi, _SECTIONS + 1)))
