@@ -127,7 +127,7 @@ def test_command_line_takes_an_own_reference(tmp_path, fitted_db):
         ("source,channel,t,value,unit\nA,x,0,1,ft\n", ["ft", "m"]),
         ("source,channel,t,value,unit\nA,x,0,one,m\n", ["row 2", "value", "one"]),
         ("source,channel,t,value,unit,sigma\nA,x,0,1,m,?\n", ["row 2", "sigma"]),
-        ("source,channel,t,value,unit\nA,x,900,1,m\n", ["begins", "900"]),
+        ("source,channel,t,value,unit\nA,x,900,1,m\nA,x,901,1,m\n", ["begins", "900"]),
         (
             "source,channel,t,value,unit\nA,x,0,1,m\nA,x,1e9,1,m\n",
             ["A x", "row 3", "t goes to 1e+09", "to 50 times the run"],

@@ -139,6 +139,26 @@ def test_sources_that_nothing_names_and_holes_are_said(tmp_path):
     assert any("a gap from t = " in note for note in notes), notes
 
 
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda t: t.drop(t.index[40]), "a gap from t = 39 to 41, usual steps are 1"),
+        (lambda t: t.drop(t.index[141:161]), "psi at 140 end before the others, at t = 160"),
+        (lambda t: t.assign(value=t["value"].where(t.index != 503, 0.0)), "1 of 161 points of y are far from"),
+        (lambda t: t.assign(sigma=t["sigma"] * 20.0), "standard errors of p that are"),
+    ],
+)
+def test_a_row_that_is_missing_or_misprinted_is_said(tmp_path, change, words):
+    *_, notes = _held(tmp_path / "mine.csv", "hzz20", change(pd.read_csv(DATA / "hzz20.csv")))
+    assert any(words in note for note in notes), notes
+
+
+def test_a_source_of_one_point_is_refused_before_anything_is_flown(tmp_path):
+    table = pd.read_csv(DATA / "hzz20.csv")
+    with pytest.raises(InputError, match="row 42, EXPEXP psi: one point"):
+        _held(tmp_path / "mine.csv", "hzz20", table.assign(source=table["source"].where(table.index != 40, "EXPEXP")))
+
+
 def test_a_channel_as_flown_but_for_a_unit_is_said(tmp_path, fitted_db):
     """The flight's own heave velocity in thousandths, z up as the case states; nothing else in the file could tell."""
     flight = validate("vzz10-15kt", fitted_db).simulation

@@ -168,7 +168,7 @@ def test_a_boat_does_what_it_is_told_and_lies_upright(tmp_path, old, new, key):
 
 def test_a_boat_whose_heel_and_trim_are_held_may_be_heavy_above(tmp_path):
     """A ship in surge, sway and yaw: the waterplane holds her up, of which the file says nothing."""
-    edit = ("centre_of_gravity = { value = [0.25, 0.0, 0.0]", "centre_of_gravity = { value = [0.25, 0.0, -0.1]")
+    edit = ("centre_of_gravity = { value = [0.245, 0.0, 0.0]", "centre_of_gravity = { value = [0.245, 0.0, -0.1]")
     assert load_vehicle(written(tmp_path, "vehicles", "kvlcc2-mmg", edit)).name == "kvlcc2-mmg"
 
 

@@ -120,7 +120,21 @@ def check_records(case: Case, reference: Series, vehicle: Vehicle, where: str) -
                 if doubt.stops:
                     raise InputError(place, found, doubt.allowed)
                 said.append(f"{place}: {found}; {doubt.allowed}")
+        said += _shorter(channels, source, reference)
     return said
+
+
+def _shorter(channels: dict[str, Record], source: str, reference: Series) -> list[str]:
+    """Channels that end before the others of their source, in a file that somebody wrote."""
+    ends = {c: float(r.abscissa[-1]) for c, r in channels.items() if c in CHANNELS and len(r)}
+    last = max(ends.values(), default=0.0)
+    short = [c for c, end in ends.items() if end < (1.0 - limits()["ends_apart"]) * last]
+    if not reference.rows or not short:
+        return []
+    at = ", ".join(f"{c} at {ends[c]:.4g}" for c in short)
+    return [
+        f"reference {source}: {at} end before the others, at {reference.abscissa} = {last:.4g}: is something missing?"
+    ]
 
 
 def _doubts(
@@ -231,7 +245,8 @@ def _clock(record: Record, case: Case, abscissa: str) -> Iterator[Doubt]:
         yield Doubt(after, found, f"times in s, to {named['run_share']:g} times the run; ms, minutes, a clock?")
     steps = np.diff(along)
     usual = float(np.median(steps))
-    if len(steps) >= 8 and float(steps.max()) > named["gap"] * usual:
+    even = float(np.mean(np.abs(steps - usual) <= named["even_within"] * usual)) >= named["even_share"]
+    if len(steps) >= 8 and float(steps.max()) > named["gap_of_even" if even else "gap"] * usual:
         at = int(np.argmax(steps))
         found = f"a gap from {abscissa} = {along[at]:.4g} to {along[at + 1]:.4g}, usual steps are {usual:.3g}"
         yield Doubt(at + 1, found, "is something missing, or misprinted?", stops=False)

@@ -9,14 +9,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ident.timeseries.neighbours import far_from_neighbours
+from ident.validation.reference_limits import limits
 from sim.files.errors import InputError
+from sim.files.record import Record
 from sim.flight.case import Case
-from sim.flight.series import Series
+from sim.flight.series import Series, place_of
 from sim.flight.simulation import CHANNELS, Simulation
 
 Array = NDArray[np.float64]
 # A reference over a smaller part of the run than this is of another unit of time, or of another run.
 _PART = 0.05
+# Points that show what is usual.
+_ENOUGH = 30
 _PLAIN = {c.lower().replace("_", ""): c for c in CHANNELS}
 
 
@@ -47,7 +51,15 @@ def check_reference(case: Case, reference: Series, where: str) -> list[str]:
         for unit in sorted(units - allowed):
             text = f"{channel} in {unit!r}"
             raise InputError(case.reference.file or where, text, " or ".join(sorted(allowed)))
-    return [*_unknown(case.reference.file or where, reference, named), *_spikes(case, reference)]
+    said = [*_unknown(case.reference.file or where, reference, named), *_spikes(case, reference)]
+    for source in case.reference.compare:
+        for channel, record in reference[source].items():
+            if channel in case.reference.channels and len(record) < 2:
+                file = case.reference.file or where
+                raise InputError(
+                    place_of(reference, file, source, channel, 0), "one point", "two points or more of a series"
+                )
+    return said
 
 
 def _spikes(case: Case, reference: Series) -> list[str]:
@@ -56,13 +68,30 @@ def _spikes(case: Case, reference: Series) -> list[str]:
     for source, channels in reference.data.items():
         for name in case.reference.channels if case.reference else ():
             record = channels.get(name)
-            bad = far_from_neighbours(record.value) if record is not None else np.zeros(0, dtype=bool)
+            bad = _far(record) if record is not None else np.zeros(0, dtype=bool)
             if record is None or not bad.any():
                 continue
             at = f"{reference.abscissa} = {float(record.abscissa[bad][0]):.4g}"
             text = f"{int(bad.sum())} of {len(bad)} points of {name} are far from their neighbours, the first at {at}"
             said.append(f"reference {source}: {text}: a misprint? They are compared as they stand")
     return said
+
+
+def _far(record: Record) -> NDArray[np.bool_]:
+    """Samples far from the median around them, or from the line between their two neighbours."""
+    bad = far_from_neighbours(record.value)
+    along, value = record.abscissa, record.value
+    if len(record) < _ENOUGH:
+        return bad
+    share = (along[1:-1] - along[:-2]) / (along[2:] - along[:-2])
+    off = np.abs(value[1:-1] - (1.0 - share) * value[:-2] - share * value[2:])
+    usual = float(np.percentile(off, 95))
+    beside = np.zeros(len(record), dtype=bool)
+    # A control that stands still between its steps leaves no usual distance.
+    beside[1:-1] = (off > limits()["off_line"] * usual) & (usual > 0.0)
+    # The neighbours of a misprint are off their lines by half of it.
+    beside[1:-1] &= off >= np.maximum(np.append(off[1:], 0.0), np.insert(off[:-1], 0, 0.0))
+    return bad | beside
 
 
 def _unknown(file: str, reference: Series, named: set[str]) -> list[str]:

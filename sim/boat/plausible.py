@@ -27,8 +27,9 @@ _FULLNESS = (3e-4, math.pi / 6.0)
 _SPREAD = (0.17, 0.4)
 # From fresh water to brine, what a body may displace [kg/m^3]: only the size of its length is looked at.
 _WATER = (990.0, 1250.0)
-# Longest way of a plane from amidships to its limit [s]: rudders of ships take 15 (SOLAS II-1, regulation 29).
-_SLOWEST_PLANE = 300.0
+# Longest way of a plane from amidships to its limit [s]: rudders of ships take 15 (SOLAS II-1, regulation 29);
+# rad/s written as deg/s are 57 times slower.
+_SLOWEST_PLANE = 100.0
 # Cosine of 45 degrees: a plane whose leading edge looks elsewhere does not lift up, down or sideways.
 _AHEAD = math.sqrt(0.5)
 # Faster than any rudder servo [deg/s].
