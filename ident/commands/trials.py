@@ -11,24 +11,39 @@ import click
 from ident.commands.shared import Number, PathType, console_for, either, emit, json_to, out_file
 from ident.text import on_screen
 
-# What may follow the first word of a maneuver: its angles, and second words.
+# What may follow the first word of a maneuver: its angles, and second words; three words at most.
 _FOLLOWS = re.compile(r"\d+(\.\d+)?(/\d+(\.\d+)?)?|zig-?zag|circle|spiral|out|stop|decay|change|keeping", re.IGNORECASE)
+_WORDS = 3
+
+
+def _follows(text: str) -> bool:
+    return _FOLLOWS.fullmatch(text) is not None and not Path(text).exists()
+
+
+def _as_one_word(args: list[str]) -> list[str]:
+    """Arguments in which the words after ``--maneuver`` are one; a file that exists is no such word."""
+    for at, text in enumerate(args):
+        if text != "--maneuver" and not text.startswith("--maneuver="):
+            continue
+        first = at + (text == "--maneuver")
+        words, rest = args[first : first + 1], args[first + 1 :]
+        while (
+            rest
+            and len(" ".join(words).split()) < _WORDS
+            and _FOLLOWS.fullmatch(rest[0])
+            and not Path(rest[0]).exists()
+        ):
+            words.append(rest.pop(0))
+        named = [" ".join(words)] if words else []
+        return [*args[:first], *named, *_as_one_word(rest)]
+    return args
 
 
 class _Maneuver(click.Command):
     """A command whose ``--maneuver zigzag 20/20`` needs no quotation marks."""
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        joined: list[str] = []
-        inside = False
-        for text in args:
-            follows = inside and len(joined[-1].split()) < 3 and _FOLLOWS.fullmatch(text) and not Path(text).exists()
-            if follows and joined[-1] != "--maneuver":
-                joined[-1] += f" {text}"
-                continue
-            inside = text.startswith("--maneuver") or (inside and joined[-1] == "--maneuver")
-            joined.append(text)
-        return super().parse_args(ctx, joined)
+        return super().parse_args(ctx, _as_one_word(args))
 
 
 @click.command(cls=_Maneuver)

@@ -20,6 +20,7 @@ from ident.timeseries.splines import (
     ORDER,
     added,
     basis,
+    decade_of_least,
     gram,
     knots_for,
     log_det,
@@ -35,6 +36,8 @@ _DECADES = (-9.0, 13.0)
 # The first memory that is tried, in steps of the record, and the longest: a share of the record, beyond which noise
 # cannot be told from motion.
 _FIRST, _LONGEST = 0.5, 1.0 / 50.0
+# Change of the memory's logarithm by which the curvature of its likelihood is measured, and its largest standard error.
+_ASIDE, _WIDEST = 0.2, 0.7
 # Samples further apart than this many of the median steps begin anew.
 _GAP = 4.0
 # Decades about the likeliest smoothing parameter of one memory within which that of the next is sought.
@@ -117,8 +120,6 @@ def likely(time: Array, value: Array, memory: float | None = 0.0) -> Likely:
     time, value : (n,) [s], growing, and the samples; at least 8.
     memory : Of the noise [s]; None to find it.
     """
-    from scipy.optimize import minimize_scalar
-
     scale = float(np.std(value)) or 1.0
     unit = Samples(time, (value - value.mean()) / scale, 0, 1.0, memory or 0.0)
     knots = knots_for(time)
@@ -127,15 +128,7 @@ def likely(time: Array, value: Array, memory: float | None = 0.0) -> Likely:
     if memory is None:
         at, best = _doubled(knots, of_path, unit, best)
         if at:
-            middle = best.decade
-            found = minimize_scalar(
-                lambda x: _best(knots, of_path, replace(unit, memory=math.exp(x)), middle).loss,
-                bounds=(math.log(at / 2.0), math.log(at * 2.0)),
-                method="bounded",
-                options={"xatol": 0.05},
-            )
-            at = math.exp(float(found.x))
-            best = _best(knots, of_path, replace(unit, memory=at), middle)
+            at, best = _expected(knots, of_path, unit, at, best.decade)
     sigma = scale * math.sqrt(best.left / (time.size - ORDER))
     weight = step_of(knots) ** (2 * ORDER - 1) * 10.0**best.decade
     return Likely(sigma**2 / weight, sigma, at)
@@ -155,13 +148,37 @@ def _doubled(knots: Array, of_path: Any, unit: Samples, white: _Fit) -> tuple[fl
     return at, best
 
 
+def _expected(knots: Array, of_path: Any, unit: Samples, near: float, decade: float) -> tuple[float, _Fit]:
+    """The memory with which noise has the power that is expected of it, and the fit there.
+
+    What noise of a memory does to a path grows with the product of its variance and its memory, which a record tells to
+    some tenths and to one side. It is averaged over the likelihood of the memory, whose maximum would be too low.
+    """
+    from scipy.optimize import minimize_scalar
+
+    def fitted(x: float) -> _Fit:
+        return _best(knots, of_path, replace(unit, memory=math.exp(x)), decade)
+
+    around = math.log(near / 2.0), math.log(near * 2.0)
+    middle = float(
+        minimize_scalar(lambda x: fitted(x).loss, bounds=around, method="bounded", options={"xatol": 0.05}).x
+    )
+    best = fitted(middle)
+    # Steps of a standard error, as the curvature of the loss of two likelihoods has it.
+    sides = [fitted(middle - _ASIDE).loss, fitted(middle + _ASIDE).loss]
+    bent = max((sum(sides) - 2.0 * best.loss) / _ASIDE**2, 2.0 / _WIDEST**2)
+    places = middle + math.sqrt(2.0 / bent) * np.arange(-3.0, 3.5)
+    fits = [fitted(float(x)) for x in places]
+    shares = np.exp(-0.5 * (np.array([fit.loss for fit in fits]) - best.loss))
+    at = float(shares @ places / shares.sum())
+    return math.exp(at), fitted(at)
+
+
 def _best(knots: Array, of_path: Any, unit: Samples, near: float | None = None) -> _Fit:
     """The likeliest smoothing parameter, as a decade of the one of a unit response; near another, or anywhere.
 
     ``of_path`` is the basis at the samples, which does not change with their memory; their size is one.
     """
-    from scipy.optimize import minimize_scalar
-
     white, shrunk = whitening(unit)
     left_side, right_side = white @ of_path, white @ unit.value
     bands, right, penalty = gram(left_side), left_side.T @ right_side, penalty_of(knots)
@@ -181,7 +198,4 @@ def _best(knots: Array, of_path: Any, unit: Samples, near: float | None = None) 
         return _Fit(decade, loss, left)
 
     grid = np.arange(*_DECADES) if near is None else near + np.arange(-_NEAR, _NEAR + 0.5)
-    best = min((fitted(float(d)) for d in grid), key=lambda fit: fit.loss).decade
-    bounds = (best - 1.0, best + 1.0)
-    found = minimize_scalar(lambda d: fitted(d).loss, bounds=bounds, method="bounded", options={"xatol": 0.02})
-    return fitted(float(found.x))
+    return fitted(decade_of_least(lambda d: fitted(d).loss, grid))

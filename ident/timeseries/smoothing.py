@@ -24,6 +24,7 @@ from ident.timeseries.splines import (
     HOPELESS,
     ORDER,
     added,
+    decade_of_least,
     gram,
     knots_for,
     log_det,
@@ -36,7 +37,7 @@ Array = NDArray[np.float64]
 # A rudder that begins to move makes the third derivative jump. The density is taken this much larger than the
 # likeliest one: the bias of a cubic kink falls with its root, to a third, and standard errors grow with its
 # twelfth root, by a fifth (Hall 1992, Annals of Statistics 20:675-694, on undersmoothing for intervals).
-_ROUGHER = 10.0
+ROUGHER = 10.0
 
 
 @dataclass(frozen=True)
@@ -128,13 +129,16 @@ class SmoothPath:
         return np.asarray(np.sqrt(np.maximum(variance, 0.0)), dtype=np.float64)
 
 
-def smooth(samples: list[Samples], lo: float | None = None, hi: float | None = None) -> SmoothPath:
+def smooth(
+    samples: list[Samples], lo: float | None = None, hi: float | None = None, rougher: float = ROUGHER
+) -> SmoothPath:
     """The path through samples of it, and of its rate where there are any.
 
     Parameters
     ----------
     samples : The first of the path itself; a ``sigma`` of 0 and a ``memory`` of None are found from the samples.
     lo, hi : Times between which the path is wanted; those of the samples when None.
+    rougher : Density of the path's third derivative, in likeliest ones.
 
     Returns
     -------
@@ -153,7 +157,7 @@ def smooth(samples: list[Samples], lo: float | None = None, hi: float | None = N
     density = noise.density
     if len(told) > 1 or first.sigma:
         density = _density(knots, sides, bands, right, density)
-    density *= _ROUGHER
+    density *= rougher
     factor, solved = solve(added(bands, penalty_of(knots) / density), right)
     # B-splines sum to one: the mean is a shift of every coefficient.
     return SmoothPath(knots, solved + centre, factor, found.sigma, tuple(told), centre)
@@ -161,8 +165,6 @@ def smooth(samples: list[Samples], lo: float | None = None, hi: float | None = N
 
 def _density(knots: Array, sides: list[tuple[Any, Array]], bands: Array, right: Array, near: float) -> float:
     """Spectral density of the third derivative at the largest likelihood, where the noise is known."""
-    from scipy.optimize import minimize_scalar
-
     penalty, rank = penalty_of(knots), right.size - ORDER
 
     def loss(decade: float) -> float:
@@ -174,8 +176,4 @@ def _density(knots: Array, sides: list[tuple[Any, Array]], bands: Array, right: 
         left = sum(float(np.sum((value - side @ solved) ** 2)) for side, value in sides)
         return left + weight * roughness(knots, solved) + log_det(factor) - rank * math.log(weight)
 
-    # The loss may have two bottoms: the deeper one is found on a grid.
-    grid = np.arange(-4.0, 4.5, 1.0)
-    least = grid[int(np.argmin([loss(d) for d in grid]))]
-    best = minimize_scalar(loss, bounds=(least - 1.0, least + 1.0), method="bounded", options={"xatol": 0.02})
-    return near * 10.0 ** float(best.x)
+    return near * 10.0 ** decade_of_least(loss, np.arange(-4.0, 4.5, 1.0))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -104,3 +105,18 @@ def solve(bands: Array, right: Array) -> tuple[Array, Array]:
 
     factor = cholesky_banded(bands)
     return factor, cho_solve_banded((factor, False), right)
+
+
+def decade_of_least(loss: Callable[[float], float], grid: Array) -> float:
+    """Decade of a smoothing parameter at which a loss is least.
+
+    Parameters
+    ----------
+    loss : Of a decade; it may have two bottoms.
+    grid : Decades, one apart, of which the least is taken first: the deeper bottom.
+    """
+    from scipy.optimize import minimize_scalar
+
+    near = float(grid[int(np.argmin([loss(float(d)) for d in grid]))])
+    found = minimize_scalar(loss, bounds=(near - 1.0, near + 1.0), method="bounded", options={"xatol": 0.02})
+    return float(found.x)

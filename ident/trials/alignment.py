@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ident.timeseries.noise import Samples
 from ident.timeseries.scaled_rate import smooth_with_rate
-from ident.timeseries.smoothing import SmoothPath, smooth
+from ident.timeseries.smoothing import ROUGHER, SmoothPath, smooth
 from ident.trials.body import angle_rate
 from ident.trials.consistency import path_of, regressed
 from ident.trials.maneuvers import Maneuver, control_of, holds, large
@@ -28,6 +28,9 @@ _RUN_UP_S = 20.0
 _CLOSE = 0.02
 # Heading change up to which a turn is still being entered.
 _ENTRY = math.radians(60.0)
+# A path that begins at the execute has no samples before it, and the bias of smoothing is larger at an end than
+# within: its density is taken this many times the likeliest.
+_AT_AN_END = 10.0 * ROUGHER
 # A course is steady when it turns by less than this share of the maneuver's largest rate.
 _STEADY = 0.01
 # A course from which a zigzag counts differs from that before it by this at least [rad].
@@ -194,10 +197,8 @@ def _pitch(
         return 0.0, 0.0
     half = 0.5 * float(np.median(np.diff(control.abscissa)))
     reversals = [float(record.at(h.end + half)) for h in large(holds(control))[:-1]]
-    away = {
-        base: np.mean([abs(abs(x - base) - math.radians(maneuver.check)) for x in reversals]) for base in (0.0, trim[0])
-    }
-    if not reversals or away[0.0] <= away[trim[0]]:
+    away = {base: sum(abs(abs(x - base) - math.radians(maneuver.check)) for x in reversals) for base in (0.0, trim[0])}
+    if away[0.0] <= away[trim[0]]:
         said.append(f"{level}: {one.headers[control.channel]} is reversed at the check angle from there")
         return 0.0, 0.0
     said.append(
@@ -389,7 +390,7 @@ def _from_a_steady_course(path: SmoothPath, execute: float, said: list[str]) -> 
     steady = Samples(np.array([execute]), np.zeros(1), 1, share)
     first = replace(path.samples[0], value=path.samples[0].value + path.centre)
     # An execute between two samples may lie before the first of them.
-    again = smooth([first, *path.samples[1:], steady], lo=min(float(path.knots[4]), execute))
+    again = smooth([first, *path.samples[1:], steady], lo=min(float(path.knots[4]), execute), rougher=_AT_AN_END)
     return replace(again, shared=path.shared)
 
 

@@ -1,4 +1,8 @@
-"""Channels under one another's names: what a channel should be, from the others, found in another column."""
+"""Channels under one another's names: the checks for them, the surest first.
+
+Pairs that mend every broken relation (``exchanged_pairs``) and controls under the wrong name (``exchanged_controls``)
+are sure; without either, what a channel should be by the others is looked for in another column.
+"""
 
 from __future__ import annotations
 
@@ -11,9 +15,10 @@ from numpy.typing import NDArray
 
 from ident.checks.findings import Finding
 from ident.timeseries.smoothing import SmoothPath
-from ident.trials.consistency import RATES, expected_rate, finding_of, path_of, regressed
+from ident.trials.consistency import RATES, expected_rate, path_of, regressed
+from ident.trials.exchanged_controls import exchanged_controls
+from ident.trials.exchanged_pairs import exchanged_pairs, pair_of
 from ident.trials.reading import Recording
-from ident.trials.swapped import steered_by_another, swapped
 
 Array = NDArray[np.float64]
 # Correlation below which a channel is not what its name says, and from which another column is.
@@ -31,7 +36,7 @@ def exchanged(one: Recording) -> list[Finding]:
     one : In program axes.
     """
     path = cache(lambda name: path_of(one.channels[name]))
-    sure = [*swapped(one, path), *steered_by_another(one)]
+    sure = [*exchanged_pairs(one, path), *exchanged_controls(one)]
     if sure:
         return sure
     of_columns: dict[frozenset[str], Finding] = {}
@@ -73,7 +78,7 @@ def _rates(one: Recording, path: Callable[[str], SmoothPath]) -> Iterator[Findin
             if pair is not None and abs(pair.correlation) > best[0]:
                 best = (abs(pair.correlation), angle, other, f"{one.headers[name]} is the rate of {held}")
         if best[1]:
-            yield _finding(one, *best[1:])
+            yield pair_of(one, *best[1:])
 
 
 def _alike(slope: float) -> bool:
@@ -101,7 +106,7 @@ def _along_the_track(one: Recording, path: Callable[[str], SmoothPath]) -> Itera
             pair = regressed(t, one.channels[other].at(t), like)
             like_it = pair is not None and pair.correlation > _NOT
             if off > _SIZE * size and away < _NEARER * off and away < _SIZE * size and (like_it or name == "u"):
-                yield _finding(one, name, other, f"the {_WORDS[name]} of the track stands in {one.headers[other]}")
+                yield pair_of(one, name, other, f"the {_WORDS[name]} of the track stands in {one.headers[other]}")
 
 
 def _abeam(one: Recording) -> Iterator[Finding]:
@@ -111,7 +116,7 @@ def _abeam(one: Recording) -> Iterator[Finding]:
     ahead, abeam = (one.channels[name].value for name in ("u", "v"))
     first = max(_FEWEST, ahead.size // 50)
     if abs(float(np.median(abeam[:first]))) > 2.0 * abs(float(np.median(ahead[:first]))):
-        yield _finding(one, "u", "v", f"the boat begins by going sideways, at the speed in {one.headers['v']}")
+        yield pair_of(one, "u", "v", f"the boat begins by going sideways, at the speed in {one.headers['v']}")
 
 
 _WORDS = {"u": "speed ahead", "v": "speed abeam"}
@@ -126,10 +131,3 @@ def _away(one: Recording, name: str, t: Array, like: Array) -> float:
 
 def _shared(a: Array, b: Array) -> Array:
     return a[(a >= b[0]) & (a <= b[-1])]
-
-
-def _finding(one: Recording, name: str, other: str, what: str) -> Finding:
-    header, there = one.headers[name], one.headers[other]
-    text = f"{what}: channels exchanged, {header} and {there}"
-    remedy = f'trial.toml: [channels] "{there}" = "{name} [UNIT]" and "{header}" = "{other} [UNIT]", or mend the file'
-    return finding_of(one, "exchanged_channels", (name, other), float(one.rows[0][0]), text, remedy)

@@ -149,6 +149,14 @@ def with_errors(
     return metrics
 
 
+def measured_until(one: Recording, maneuver: Maneuver, paths: dict[str, SmoothPath]) -> float:
+    """Where the measurement ends on the record's clock [s]: a turn where the rudder leaves its side."""
+    end = _range(paths)[1]
+    if maneuver.kind == "turning_circle" and (control := control_of(one)) is not None:
+        end = min(end, turn_ends(control) or end)
+    return end
+
+
 def measured(
     one: Recording, maneuver: Maneuver, start: Start, paths: dict[str, SmoothPath], spec: TrialFile, count: int = DRAWS
 ) -> dict[str, Value]:
@@ -165,10 +173,7 @@ def measured(
     InputError
         When the record lacks a channel that the maneuver is measured on.
     """
-    end = _range(paths)[1]
-    if maneuver.kind == "turning_circle" and (control := control_of(one)) is not None:
-        end = min(end, turn_ends(control) or end)
-    grid = _grid(start.time, end)
+    grid = _grid(start.time, measured_until(one, maneuver, paths))
     origin = place_of(one, spec, start.time)
     likely = _most_likely(paths, grid, start, origin)
     measure = estimator(one, maneuver, start, spec, likely)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -17,15 +16,16 @@ from ident.trials.earth import in_program_axes
 from ident.trials.exchanged import exchanged
 from ident.trials.keeping import steering_of
 from ident.trials.maneuvers import Maneuver, control_of, maneuver_of, turn_ends
-from ident.trials.measure import DRAWS, Value, measured
+from ident.trials.measure import DRAWS, Value, measured, measured_until
 from ident.trials.reading import Recording, read_recording
+from ident.trials.shown import Shown, refuse_unshown
 from ident.trials.spec import TrialFile
 from ident.trials.spikes import without_spikes
 from ident.trials.stated import quoted, refuse_unused, unused
 from sim.files.errors import InputError
 
-# A zigzag has its check angle at this share of the plane angle or more, and swings by less than this [deg].
-_LEAST_CHECK, _MOST_SWING = 0.1, 150.0
+# A zigzag has its check angle at this share of the plane angle or more.
+_LEAST_CHECK = 0.1
 
 
 @dataclass(frozen=True)
@@ -90,22 +90,6 @@ def _borne_out(one: Recording, maneuver: Maneuver, findings: list[Finding]) -> b
     return (by_control and plausible) or "north" in one.channels
 
 
-def _swings(trial: Trial) -> None:
-    """Refuse a zigzag that no boat makes, or that never comes to its check angle."""
-    if "zigzag" not in trial.maneuver.kind:
-        return
-    name = "psi" if trial.maneuver.kind == "zigzag" else "theta"
-    record, header = trial.recording.channels[name], trial.recording.headers[name]
-    size = math.degrees(float(np.max(np.abs(record.value - float(trial.paths[name](trial.start.time))))))
-    place = f"{trial.recording.file}, column {header}"
-    remedy = f"the unit of {header} (degrees and radians?), the maneuver, or execute_s, in trial.toml"
-    if size > _MOST_SWING:
-        raise InputError(place, f"a zigzag that swings by {size:.4g} deg", remedy)
-    if "execute_2_s" not in trial.metrics:
-        check = f"{trial.maneuver.check:g} deg, the check angle of {trial.maneuver}"
-        raise InputError(place, f"{size:.3g} deg at most, which never comes to {check}", remedy)
-
-
 def _taken_for_granted(
     one: Recording, maneuver: Maneuver, start: Start, smoothed: dict[str, SmoothPath], spec: TrialFile
 ) -> list[str]:
@@ -157,7 +141,7 @@ def measure_trial(path: Path, spec: TrialFile | None = None, count: int = DRAWS,
     ------
     InputError
         For a file that cannot be read, a record that contradicts itself where the numbers would be
-        wrong, or a maneuver that is neither stated nor found.
+        wrong, or a maneuver that is neither stated nor found, or stated and not shown.
 
     Examples
     --------
@@ -193,6 +177,6 @@ def measure_trial(path: Path, spec: TrialFile | None = None, count: int = DRAWS,
         raise InputError(str(path), named, remedy) from error
     by_key = [f"key {key}: changes nothing here, {why}" for key, why, _ in idle]
     said = (*one.assumed, *by_key, by, *start.said, *taken, *_taken_for_granted(one, maneuver, start, smoothed, spec))
-    done = Trial(one, spec, maneuver, start, smoothed, metrics, said, tuple(findings))
-    _swings(done)
-    return done
+    until, ordered = measured_until(one, maneuver, smoothed), spec.step_m is not None
+    refuse_unshown(Shown(one, maneuver, start, smoothed, metrics, until, ordered))
+    return Trial(one, spec, maneuver, start, smoothed, metrics, said, tuple(findings))

@@ -2,7 +2,7 @@
 
 A record of one boat fulfils relations: rates are those of their angles, speeds those of the track. Where some are
 broken, two columns are exchanged on trial; when that mends every broken one and breaks none, they stand under one
-another's names. A control is told by what answers to it.
+another's names.
 """
 
 from __future__ import annotations
@@ -10,7 +10,6 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,9 +18,7 @@ from ident.checks.findings import Finding
 from ident.timeseries.smoothing import SmoothPath
 from ident.trials.body import body_rate, velocities
 from ident.trials.consistency import finding_of, regressed
-from ident.trials.maneuvers import steered
 from ident.trials.reading import Recording
-from sim.files.record import Record
 
 Array = NDArray[np.float64]
 Channels = dict[str, Array]
@@ -36,7 +33,7 @@ _RELATIONS = {
 }
 # Angles that stand between a body and those: what they are off breaks the relation too.
 _INCLINED = {"r": ("phi", "theta"), "p": ("theta", "psi"), "q": ("phi", "psi"), "u": (), "v": (), "w": ()}
-_PLAIN = ("psi", "phi", "theta", "r", "p", "q", "u", "v", "w", "north", "east", "z", "dH", "dV")
+PLAIN = ("psi", "phi", "theta", "r", "p", "q", "u", "v", "w", "north", "east", "z", "dH", "dV")
 # Correlation and slope from which a relation holds, and beyond which it is broken.
 _HOLDS, _SLOPE = 0.9, 0.15
 _BROKEN, _FAR = 0.8, 0.35
@@ -46,14 +43,10 @@ _MOVES = 4.0
 _DEGREES = math.degrees(1.0)
 # No boat that is steered heels further; what stands under that name is another channel.
 _MOST_HEEL = math.radians(60.0)
-# By how much more a heading has to go with one control than with another to be steered by it.
-_CLOSER = 0.2
-# A heading that has turned so far has been steered before.
-_TURNED = math.radians(2.0)
 _WORDS = {"north": "x", "east": "y"}
 
 
-def swapped(one: Recording, path: Callable[[str], SmoothPath]) -> Iterator[Finding]:
+def exchanged_pairs(one: Recording, path: Callable[[str], SmoothPath]) -> Iterator[Finding]:
     """Pairs of columns whose exchange mends every relation that is broken.
 
     Parameters
@@ -61,7 +54,7 @@ def swapped(one: Recording, path: Callable[[str], SmoothPath]) -> Iterator[Findi
     one : In program axes.
     path : The smooth path of a channel.
     """
-    names = [n for n in _PLAIN if n in one.channels and len(one.channels[n]) >= _FEWEST and _moves(one, n)]
+    names = [n for n in PLAIN if n in one.channels and len(one.channels[n]) >= _FEWEST and _moves(one, n)]
     too_far = _heels_too_far(one) and "phi" in names
     if not set(_RELATIONS) & set(names) and not too_far:
         return
@@ -129,67 +122,7 @@ def _instead_of_heel(one: Recording, t: Array, values: Channels, rates: Channels
         what = (
             f"a heel of {size:.0f} deg, and the speed is that of the track when {coordinate} and {there} change places"
         )
-        yield _pair(one, "phi", name, what)
-
-
-def steered_by_another(one: Recording) -> Iterator[Finding]:
-    """Rudder and planes, or two angles, exchanged: the maneuver shows under another control or angle only."""
-    controls = [c for c in ("dH", "dV") if c in one.channels]
-    if "dH" not in controls or "psi" not in one.channels:
-        return
-    by_rudder, turns = steered(one, "psi", "dH"), _leaves(one.channels["psi"], _TURNED)
-    if by_rudder and "dV" in controls and steered(one, "psi", "dV"):
-        rudder, planes = (_followed(one.channels["psi"], one.channels[c]) for c in ("dH", "dV"))
-        if planes > rudder + _CLOSER:
-            what = f"{one.headers['psi']} follows {one.headers['dV']} more closely than {one.headers['dH']}"
-            yield _pair(one, "dH", "dV", what)
-            return
-    if by_rudder and (turns is None or (_moved_at(one.channels["dH"]) or 0.0) <= turns):
-        return
-    for other in (c for c in _PLAIN if c in one.channels and c not in ("psi", "r", "north", "east", "dH")):
-        record = one.channels[other]
-        if not record.unit.startswith("rad"):
-            # Degrees under the header of another unit.
-            record = replace(record, value=record.value / _DEGREES)
-        if steered(one, "psi", other, record) and (_moved_at(record) or 0.0) <= (turns or 0.0):
-            what = f"{one.headers['psi']} answers to {one.headers[other]} and not to {one.headers['dH']}"
-            yield _pair(one, "dH", other, what)
-            return
-    if by_rudder:
-        return
-    if not ("dV" in controls and "theta" in one.channels and steered(one, "theta", "dV")):
-        for angle in ("theta", "phi"):
-            if angle in one.channels and "r" not in one.channels and steered(one, angle, "dH"):
-                what = f"{one.headers[angle]} answers to {one.headers['dH']}, and {one.headers['psi']} does not"
-                yield _pair(one, "psi", angle, what)
-                return
-
-
-def _followed(angle: Record, control: Record) -> float:
-    """Largest correlation of an angle's rate with a control some time before, within a tenth of the record."""
-    lo, hi = max(angle.abscissa[0], control.abscissa[0]), min(angle.abscissa[-1], control.abscissa[-1])
-    t = np.linspace(lo, hi, _POINTS)
-    rate, moved, later = np.gradient(angle.at(t), t), control.at(t), _POINTS // 10
-    if min(float(np.ptp(rate)), float(np.ptp(moved))) <= 0.0:
-        return 0.0
-    pairs = ((rate[k:], moved[: _POINTS - k]) for k in range(0, later, max(1, later // 20)))
-    return max(abs(float(np.corrcoef(a, b)[0, 1])) if np.ptp(a) and np.ptp(b) else 0.0 for a, b in pairs)
-
-
-def _leaves(record: Record, size: float) -> float | None:
-    """When a channel has left its first value by a size for good as a median of three; None where it does not."""
-    x = record.value
-    middle = np.median(np.lib.stride_tricks.sliding_window_view(x, 3), axis=1)
-    away = np.flatnonzero(np.abs(middle - float(np.median(x[:3]))) > size)
-    return float(record.abscissa[int(away[0]) + 1]) if away.size else None
-
-
-def _moved_at(control: Record) -> float | None:
-    """When a control first moves; at once where it begins at its angle."""
-    most = float(np.max(np.abs(control.value)))
-    if abs(float(np.median(control.value[:3]))) > 0.5 * most:
-        return float(control.abscissa[0])
-    return _leaves(control, 0.2 * most)
+        yield pair_of(one, "phi", name, what)
 
 
 def _moves(one: Recording, name: str) -> bool:
@@ -255,10 +188,18 @@ def _finding(one: Recording, a: str, b: str, broken: str) -> Finding:
     """The first of the two is the one that a relation names."""
     a, b = sorted((a, b), key=lambda n: n not in _RELATIONS)
     what = f"{broken} do not go together, and do when {one.headers[a]} and {one.headers[b]} change places"
-    return _pair(one, a, b, what)
+    return pair_of(one, a, b, what)
 
 
-def _pair(one: Recording, a: str, b: str, what: str) -> Finding:
+def pair_of(one: Recording, a: str, b: str, what: str) -> Finding:
+    """The finding that two columns stand under one another's names, and how to say so.
+
+    Parameters
+    ----------
+    one : In program axes.
+    a, b : The two channels.
+    what : By what it is known.
+    """
     header, there = one.headers[a], one.headers[b]
     text = f"{what}: channels exchanged, {header} and {there}"
     names = [_WORDS.get(n, n) for n in (a, b)]
