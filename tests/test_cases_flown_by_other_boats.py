@@ -48,7 +48,7 @@ def test_roll_decay_of_another_boat_is_not_scored_against_bb2s_experiment(suboff
 
 def test_times_and_speed_of_a_standard_maneuver_follow_froude():
     case, where = load_case("turning-circle")
-    boat = load_vehicle("suboff")
+    boat = of_no_speed(load_vehicle("suboff"))
     moved, notes = for_boat(case, where, boat, Conditions())
     ratio = boat.particulars.length.value / load_vehicle("bb2").particulars.length.value
     assert moved.initial.speed_mps == pytest.approx(case.initial.speed_mps * np.sqrt(ratio))
@@ -61,6 +61,40 @@ def test_times_and_speed_of_a_standard_maneuver_follow_froude():
     assert scaled.D_z == pytest.approx(gain.D_z / ratio * np.sqrt(ratio))
     assert scaled.P_theta == gain.P_theta
     assert scaled.I_theta == pytest.approx(gain.I_theta / np.sqrt(ratio))
+
+
+def of_no_speed(boat):
+    """A boat that does not state the speed of its maneuvers."""
+    return boat.model_copy(update={"particulars": boat.particulars.model_copy(update={"approach_speed": None})})
+
+
+@pytest.mark.parametrize("asked", [None, 2.0])
+def test_a_standard_maneuver_is_flown_at_the_speed_of_the_boat_or_that_asked_for(asked):
+    """Lengths run in the same time: U t / L is kept, and with it gains on lengths, rates and integrals."""
+    case, where = load_case("turning-circle")
+    boat, home = load_vehicle("kvlcc2"), load_vehicle("bb2")
+    moved, notes = for_boat(case, where, boat, Conditions(speed_mps=asked))
+    speed = moved.initial.speed_mps
+    assert speed == (asked or boat.particulars.approach_speed.value)
+    assert any(f"{speed:.4g} m/s" in note for note in notes)
+    lengths = [
+        one.initial.speed_mps * one.run.duration_s / ship.particulars.length.value
+        for one, ship in ((case, home), (moved, boat))
+    ]
+    assert lengths[1] == pytest.approx(lengths[0])
+    time = moved.run.duration_s / case.run.duration_s
+    assert moved.command.dV.D_z / moved.command.dV.P_z == pytest.approx(
+        case.command.dV.D_z / case.command.dV.P_z * time
+    )
+    assert moved.command.dV.I_theta == pytest.approx(case.command.dV.I_theta / time)
+
+
+def test_a_speed_that_cannot_be_held_names_the_option(suboff_db, tmp_path):
+    arguments = ["--vehicle", "suboff", "--db", suboff_db, "--out", str(tmp_path)]
+    done = CliRunner().invoke(main, ["validate", "--case", "turning-circle", "--speed", "60", *arguments])
+    assert done.exit_code == 2
+    assert "--speed" in done.output
+    assert "Traceback" not in done.output
 
 
 def test_the_own_boat_flies_its_case_as_it_is_written():
@@ -108,10 +142,23 @@ def test_a_boat_without_a_rudder_in_its_terms_says_so(suboff_db, tmp_path):
     assert "no plane of suboff has a share in it" in done.output
 
 
-def test_a_limit_of_revolutions_goes_with_the_boat_by_froudes_law():
-    """The square root of the lengths: revolutions times the square root of a length are alike."""
-    case, where = load_case("crash-stop")
-    boat, own = load_vehicle("suboff"), load_vehicle("bb2")
-    moved, _ = for_boat(case, where, boat, Conditions())
-    root = np.sqrt(own.particulars.length.value / boat.particulars.length.value)
-    assert moved.command.n.limits_rps == pytest.approx([limit * root for limit in case.command.n.limits_rps], rel=1e-6)
+@pytest.mark.parametrize("name", ["suboff", "kvlcc2", "remus100"])
+def test_a_crash_stop_goes_astern_as_fast_as_the_boats_own_propeller_turns_ahead(name):
+    boat = load_vehicle(name)
+    moved, _ = for_boat(*load_case("crash-stop"), boat, Conditions())
+    most = boat.propeller.limits.value[1]
+    assert moved.command.n.limits_rps == [-most, most]
+
+
+def test_the_title_says_the_boat_and_the_angles_that_are_flown():
+    moved, notes = for_boat(*load_case("hzz20"), load_vehicle("remus100"), Conditions())
+    assert moved.title == "Zigzag of remus100: dH -13.6 deg at 20 deg, 1.54 m/s, D0 25 m"
+    assert any("the planes stop at 13.6 deg" in note for note in notes)
+
+
+def test_a_ship_flies_a_standard_maneuver_afloat_and_makes_no_change_of_depth():
+    boat = load_vehicle("kvlcc2")
+    moved, notes = for_boat(*load_case("turning-circle"), boat, Conditions())
+    assert moved.initial.depth_m == 0.0
+    assert not [e for e in moved.run.stop if e.channel == "D0"]
+    assert any("kvlcc2 floats" in note for note in notes)

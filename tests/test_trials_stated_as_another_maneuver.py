@@ -75,4 +75,5 @@ def test_words_of_a_maneuver_need_no_quotation_marks_and_leave_files_alone(tmp_p
     assert json.loads(done.stdout)["maneuver"] == "zigzag 20/20"
     wrong = CliRunner().invoke(main, ["trial", "20", "--maneuver", "turning", "circle"])
     assert wrong.exit_code == 2
-    assert "turning circle" in wrong.output and "Traceback" not in wrong.output
+    assert "turning circle" in wrong.output
+    assert "Traceback" not in wrong.output

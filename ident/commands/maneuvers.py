@@ -182,7 +182,7 @@ def validate(**options: Any) -> None:
     asked.check()
     console = console_for(quiet=asked.json_path == "-")
     with _figures(asked) as figures:
-        with equilibrium_of(asked.case or "of --all"):
+        with equilibrium_of(asked.case or "of --all", "" if asked.every else "; --speed and --depth state another"):
             board = _all(asked, console) if asked.every else None
             done = [_one(asked, console)] if board is None else board.flown
         if asked.samples:

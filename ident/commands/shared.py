@@ -213,15 +213,21 @@ def emit(data: Any, target: str) -> None:
 
 
 @contextmanager
-def equilibrium_of(case: str) -> Iterator[None]:
-    """Says of which case there is no equilibrium: ``NoEquilibrium`` becomes an ``InputError``."""
+def equilibrium_of(case: str, hint: str = "") -> Iterator[None]:
+    """Says of which case there is no equilibrium: ``NoEquilibrium`` becomes an ``InputError``.
+
+    Parameters
+    ----------
+    case : As it was asked for.
+    hint : How another state is asked for, after what is allowed.
+    """
     from sim.files.errors import InputError
     from sim.flight.trim import NoEquilibrium
 
     try:
         yield
     except NoEquilibrium as error:
-        raise InputError(f"case {case}", str(error), "a state the boat can hold") from error
+        raise InputError(f"case {case}", str(error), f"a state the boat can hold{hint}") from error
 
 
 def console_for(quiet: bool = False) -> Any:

@@ -1,8 +1,9 @@
 """A case flown with another boat, or at another speed, depth or angle, than the one it was written for.
 
 What belongs to the case's own boat (references, published values, tolerances) does not go with it. A
-bundled case is brought to the size of the other boat by Froude's law: times with the root of the ratio of
-lengths, lengths with it; autopilot gains keep their meaning.
+bundled case is brought to the size and the speed of the other boat: lengths with the ratio of lengths, times with
+that of lengths over speeds; autopilot gains keep their meaning. The speed is that asked for, that which the vehicle
+states as that of its maneuvers, or that of Froude's law.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from ident.options import Conditions
+from sim.boat.catalogue import held
 from sim.boat.vehicle import Vehicle, load_vehicle
 from sim.files.errors import InputError
 from sim.files.toml_files import bundled
@@ -22,31 +24,45 @@ from sim.flight.commands import Commands, Event
 from sim.flight.simulate import mixer_of
 from sim.flight.simulation import Simulation
 
-# Powers of the ratio of lengths of what an event watches: a rate of change per second of it.
-_LENGTHS = {"D0": 1.0, "z": 1.0, "x": 1.0, "y": 1.0, "point_depth": 1.0, "u": 0.5, "v": 0.5, "w": 0.5, "U": 0.5}
-_LENGTHS |= {"p": -0.5, "q": -0.5, "r": -0.5}
-# Gains: proportional, integral and differential, on a distance, an angle, a yaw rate, a speed.
-_GAINS = {"z": -1.0, "y": -1.0, "theta": 0.0, "psi": 0.0, "r": 0.5, "u": -1.0}
-_TIMES = {"P": 0.0, "I": -0.5, "D": 0.5}
+# Powers of length and time of what an event watches; of a rate of change, one more of time.
+_WATCHED = {"D0": (1, 0), "z": (1, 0), "x": (1, 0), "y": (1, 0), "point_depth": (1, 0)}
+_WATCHED |= {"u": (1, -1), "v": (1, -1), "w": (1, -1), "U": (1, -1), "p": (0, -1), "q": (0, -1), "r": (0, -1)}
+# Gains: proportional, integral and differential, of an angle on a distance, an angle, a yaw rate; of revolutions on a
+# speed.
+_GAINS = {"z": (-1, 0), "y": (-1, 0), "theta": (0, 0), "psi": (0, 0), "r": (0, 1), "u": (-1, 0)}
+_TIMES = {"P": 0, "I": -1, "D": 1}
+_DEPTHS = ("D0", "z", "point_depth")
 _STOPS = math.radians(0.01)
 
 
-def _event(event: Event, ratio: float) -> Event:
+@dataclass(frozen=True)
+class _Size:
+    """Length and time of the other boat over those of the case's own, and the revolutions of its propeller [1/s]."""
+
+    length: float
+    time: float
+    most_rps: float
+
+    def of(self, powers: tuple[int, int], times: int = 0) -> float:
+        """Factor on a quantity with these powers of length and time, and more of time."""
+        return self.length ** powers[0] * self.time ** (powers[1] + times)
+
+
+def _event(event: Event, size: _Size) -> Event:
     """An event at the size of the other boat; levels of depth are where they are."""
-    root = math.sqrt(ratio)
-    power = _LENGTHS.get(event.channel or "", 0.0)
+    powers = _WATCHED.get(event.channel or "", (0, 0))
     moved: dict[str, Any] = {}
-    for key, factor in (("after_s", root), ("for_s", root), ("steady", ratio**power / root)):
+    for key, factor in (("after_s", size.time), ("for_s", size.time), ("steady", size.of(powers, -1))):
         if getattr(event, key) is not None:
             moved[key] = getattr(event, key) * factor
     if event.change is not None:
-        moved["change"] = event.change * ratio**power
+        moved["change"] = event.change * size.of(powers)
     if event.point_m is not None:
-        moved["point_m"] = [x * ratio for x in event.point_m]
+        moved["point_m"] = [x * size.length for x in event.point_m]
     return event.model_copy(update=moved)
 
 
-def _commands(command: Commands, ratio: float) -> Commands:
+def _commands(command: Commands, size: _Size) -> Commands:
     updates: dict[str, Any] = {}
     for axis in ("dV", "dH", "n"):
         one = getattr(command, axis)
@@ -54,33 +70,68 @@ def _commands(command: Commands, ratio: float) -> Commands:
         for name in type(one).model_fields:
             kind, _, of = name.partition("_")
             if kind in _TIMES and of in _GAINS:
-                moved[name] = getattr(one, name) * ratio ** (_GAINS[of] + _TIMES[kind])
+                moved[name] = getattr(one, name) * size.of(_GAINS[of], _TIMES[kind])
         steps = []
         for step in one.step:
-            change: dict[str, Any] = {"until": [_event(e, ratio) for e in step.until]}
-            for key, power in (("distance_m", 1.0), ("yaw_rate_degps", -0.5), ("value_rps", -0.5)):
+            change: dict[str, Any] = {"until": [_event(e, size) for e in step.until]}
+            for key, factor in (
+                ("distance_m", size.length),
+                ("yaw_rate_degps", 1.0 / size.time),
+                ("value_rps", 1.0 / size.time),
+            ):
                 if getattr(step, key, None):
-                    change[key] = getattr(step, key) * ratio**power
+                    change[key] = getattr(step, key) * factor
             steps.append(step.model_copy(update=change))
         if getattr(one, "limits_rps", None):
-            moved["limits_rps"] = [limit * ratio**-0.5 for limit in one.limits_rps]
+            # Those of the case let its own boat go astern: the other one does so as fast as it goes ahead.
+            most = max(abs(limit) for limit in one.limits_rps)
+            moved["limits_rps"] = [limit / most * size.most_rps for limit in one.limits_rps]
         updates[axis] = one.model_copy(update=moved | {"step": steps})
     return command.model_copy(update=updates)
 
 
-def _scaled(case: Case, ratio: float) -> Case:
-    """Times, speed, gains and events by Froude's law; the depth stays, so that deep is deep."""
-    root = math.sqrt(ratio)
+def _resized(case: Case, size: _Size) -> Case:
+    """Times, speed, gains and events at the size of the other boat; the depth stays, so that deep is deep."""
     run = case.run.model_copy(
         update={
-            "duration_s": case.run.duration_s * root,
-            "record_s": case.run.record_s * root,
-            "step_s": min(case.run.step_s, case.run.step_s * root),
-            "stop": [_event(e, ratio) for e in case.run.stop],
+            "duration_s": case.run.duration_s * size.time,
+            "record_s": case.run.record_s * size.time,
+            "step_s": min(case.run.step_s, case.run.step_s * size.time),
+            "stop": [_event(e, size) for e in case.run.stop],
         }
     )
-    initial = case.initial.model_copy(update={"speed_mps": case.initial.speed_mps * root})
-    return case.model_copy(update={"run": run, "initial": initial, "command": _commands(case.command, ratio)})
+    initial = case.initial.model_copy(update={"speed_mps": case.initial.speed_mps * size.of((1, -1))})
+    return case.model_copy(update={"run": run, "initial": initial, "command": _commands(case.command, size)})
+
+
+def _to_its_size(case: Case, home: Vehicle, vehicle: Vehicle, asked: float | None) -> tuple[Case, list[str]]:
+    """A bundled case at the size of another boat: at the speed asked for, else the boat's own, else by Froude's law."""
+    length = vehicle.particulars.length.value / home.particulars.length.value
+    here, stated = case.initial.speed_mps, vehicle.particulars.approach_speed
+    speed = asked or (stated.value if stated else here * math.sqrt(length))
+    time = length * here / speed if here else math.sqrt(length)
+    most = vehicle.needed_propeller("a standard maneuver").limits.value[1]
+    moved = _resized(case, _Size(length, time, most))
+    if not here:
+        return moved, []
+    moved = moved.model_copy(update={"initial": moved.initial.model_copy(update={"speed_mps": speed})})
+    if asked:
+        return moved, [f"times and gains of {home.name} brought to {speed:.4g} m/s as lengths over speeds"]
+    if stated:
+        why = f"the approach speed of {vehicle.name}, times and gains as lengths over speeds"
+    else:
+        why = f"by Froude's law, times and gains alike; {vehicle.name} states no particulars.approach_speed"
+    return moved, [f"speed {here:.4g} m/s of {home.name} brought to {speed:.4g} m/s, {why}; --speed states another"]
+
+
+def _afloat(case: Case) -> Case:
+    """A case of a boat that keeps to the surface: at depth 0, which is no event that ends it."""
+    stops = [e for e in case.run.stop if e.channel not in _DEPTHS]
+    run, initial = (
+        case.run.model_copy(update={"stop": stops}),
+        case.initial.model_copy(update={"depth_m": 0.0}),
+    )
+    return case.model_copy(update={"run": run, "initial": initial})
 
 
 def largest_command(case: Case, vehicle: Vehicle, axis: str) -> float | None:
@@ -126,14 +177,21 @@ def _angles(case: Case, axis: str, angle: float | None, most: float | None) -> t
 
 
 def _title(case: Case, vehicle: Vehicle) -> str:
-    name = case.name.replace("-", " ").capitalize()
+    """What is flown, in its own angles; the case's name would say those of another boat."""
+    zigzags = [axis for axis in ("dV", "dH") if getattr(case.command, axis).law == "zigzag"]
+    name = (case.maneuver or case.name).replace("_", " ").replace("-", " ")
+    if zigzags:
+        name = "vertical zigzag" if zigzags == ["dV"] else "zigzag"
     angles = []
     for axis in ("dV", "dH"):
         one = getattr(case.command, axis)
-        values = [one.first_deg] if one.law == "zigzag" else [one.value_deg] if one.law == "fixed" else []
-        angles += [f"{axis} {v:g} deg" for v in values if v]
+        if one.law == "zigzag":
+            angles.append(f"{axis} {one.first_deg:g} deg at {one.check_deg:g} deg")
+        elif one.law == "fixed" and one.value_deg:
+            angles.append(f"{axis} {one.value_deg:g} deg")
     speed = [f"{case.initial.speed_mps:.3g} m/s"] if case.initial.speed_mps else ["at rest"]
-    return f"{name} of {vehicle.name}: {', '.join([*angles, *speed, f'D0 {case.initial.depth_m:g} m'])}"
+    words = ", ".join([*angles, *speed, f"D0 {case.initial.depth_m:g} m"])
+    return f"{name.capitalize()} of {vehicle.name}: {words}"
 
 
 def for_boat(case: Case, where: str, vehicle: Vehicle, conditions: Conditions) -> tuple[Case, list[str]]:
@@ -165,11 +223,11 @@ def for_boat(case: Case, where: str, vehicle: Vehicle, conditions: Conditions) -
         notes.append(f"references, published values and tolerances {what} left out")
     moved = case.model_copy(update={"vehicle": vehicle.name, "reference": None, "published": [], "tolerance": []})
     if not at_home and where in bundled("cases"):
-        ratio = vehicle.particulars.length.value / load_vehicle(home).particulars.length.value
-        moved = _scaled(moved, ratio)
-        if case.initial.speed_mps and conditions.speed_mps is None:
-            text = f"speed {case.initial.speed_mps:.4g} m/s of {home} brought to {moved.initial.speed_mps:.3g} m/s"
-            notes.append(f"{text} by Froude's law, times and gains alike; --speed states another")
+        moved, said = _to_its_size(moved, load_vehicle(home), vehicle, conditions.speed_mps)
+        notes += said
+        if "Z" in held(vehicle.term_set):
+            moved = _afloat(moved)
+            notes.append(f"depth 0: {vehicle.name} floats, the terms of {vehicle.term_set} have no heave")
     update = {k: v for k, v in (("speed_mps", conditions.speed_mps), ("depth_m", conditions.depth_m)) if v is not None}
     moved = moved.model_copy(update={"initial": moved.initial.model_copy(update=update)})
     for axis in ("dV", "dH"):
@@ -193,7 +251,7 @@ def _commanded(case: Case) -> list[str]:
     for axis in ("dV", "dH"):
         one = getattr(case.command, axis)
         fixed = one.law == "fixed" and bool(one.value_deg)
-        if fixed or one.law == "zigzag" or any(s.value_deg or s.yaw_rate_degps for s in one.step):
+        if fixed or one.law == "zigzag" or any(s.value_deg or s.yaw_rate_degps or s.distance_m for s in one.step):
             commanded.append(axis)
     return commanded
 

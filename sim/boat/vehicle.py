@@ -32,6 +32,8 @@ class Particulars(Data):
     centre_of_buoyancy : From the body origin [m].
     sail_top : The point whose depth is D0, from the body origin [m]; a bare hull has none until a depth
         or a flight asks for it.
+    approach_speed : Of the boat's maneuvers [m/s]: a standard maneuver of another boat is flown at it; by Froude's law
+        where it is left out.
     """
 
     length: Length
@@ -41,6 +43,7 @@ class Particulars(Data):
     centre_of_gravity: Place
     centre_of_buoyancy: Place
     sail_top: Place | None = None
+    approach_speed: Annotated[Number, in_unit("m/s", positive=True)] | None = None
 
 
 class Propeller(Data):
