@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -38,6 +39,8 @@ _DECADES = (-9.0, 13.0)
 _FIRST, _LONGEST = 0.5, 1.0 / 50.0
 # Change of the memory's logarithm by which the curvature of its likelihood is measured, and its largest standard error.
 _ASIDE, _WIDEST = 0.2, 0.7
+# Channels of which the likeliest noise is kept: those of a record.
+_KEPT = 32
 # Samples further apart than this many of the median steps begin anew.
 _GAP = 4.0
 # Decades about the likeliest smoothing parameter of one memory within which that of the next is sought.
@@ -115,11 +118,19 @@ class _Fit:
 def likely(time: Array, value: Array, memory: float | None = 0.0) -> Likely:
     """Density of the third derivative and noise at the largest likelihood.
 
+    The checks of a record and its measurement ask for the same channel: what was found of the last ones is kept.
+
     Parameters
     ----------
     time, value : (n,) [s], growing, and the samples; at least 8.
     memory : Of the noise [s]; None to find it.
     """
+    return _likely(np.ascontiguousarray(time).tobytes(), np.ascontiguousarray(value).tobytes(), memory)
+
+
+@lru_cache(maxsize=_KEPT)
+def _likely(times: bytes, values: bytes, memory: float | None) -> Likely:
+    time, value = np.frombuffer(times), np.frombuffer(values)
     scale = float(np.std(value)) or 1.0
     unit = Samples(time, (value - value.mean()) / scale, 0, 1.0, memory or 0.0)
     knots = knots_for(time)
@@ -167,7 +178,7 @@ def _expected(knots: Array, of_path: Any, unit: Samples, near: float, decade: fl
     # Steps of a standard error, as the curvature of the loss of two likelihoods has it.
     sides = [fitted(middle - _ASIDE).loss, fitted(middle + _ASIDE).loss]
     bent = max((sum(sides) - 2.0 * best.loss) / _ASIDE**2, 2.0 / _WIDEST**2)
-    places = middle + math.sqrt(2.0 / bent) * np.arange(-3.0, 3.5)
+    places = middle + math.sqrt(2.0 / bent) * np.arange(-2.0, 2.5)
     fits = [fitted(float(x)) for x in places]
     shares = np.exp(-0.5 * (np.array([fit.loss for fit in fits]) - best.loss))
     at = float(shares @ places / shares.sum())
