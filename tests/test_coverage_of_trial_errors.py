@@ -56,7 +56,9 @@ def errors(kind, rate_hz, noise, records, folder, draws=60):
     spec = TrialFile(maneuver="turning_circle" if kind == "turn" else "zigzag 20/20")
     found = []
     for seed in range(records):
-        path = write(folder / "record.csv", make(rate_hz, noise, np.random.default_rng(1000 + seed)), 6)
+        # Fresh noise in every cell: one that is the same but for its size would make all cells high or low together.
+        rng = np.random.default_rng([seed, rate_hz, round(1000.0 * noise)])
+        path = write(folder / "record.csv", make(rate_hz, noise, rng), 6)
         metrics = measure_trial(path, spec, draws).metrics
         found.append([(metrics[k].value - v) / metrics[k].sigma for k, v in known.items()])
     return np.array(found)

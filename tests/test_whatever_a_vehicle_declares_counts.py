@@ -119,10 +119,11 @@ def test_every_key_of_a_vehicle_counts(outcome, usual, place):
         assert not alike or found["names"] != usual["names"], "declared, and nothing changed"
 
 
-def test_bb2_has_every_key_but_a_term_file_and_a_ships_rudder(outcome):
-    """Whose keys are those of tests/test_own_terms_of_a_vehicle.py and tests/test_published_kvlcc2.py."""
+def test_bb2_has_every_key_but_a_term_file_a_ships_rudder_and_the_speed_of_others_maneuvers(outcome):
+    """Whose keys are those of tests/test_own_terms_of_a_vehicle.py, tests/test_published_kvlcc2.py and
+    tests/test_cases_flown_by_other_boats.py."""
     there = {place[-1] for place in PLACES} | {step for place in PLACES for step in place if isinstance(step, str)}
-    assert {key.name for key in keys("vehicle")} - there == {"terms", "rudder", "area", "height"}
+    assert {key.name for key in keys("vehicle")} - there == {"terms", "rudder", "area", "height", "approach_speed"}
     size = {"area": BB2["particulars"]["length"] | {"unit": "m2"}, "height": BB2["particulars"]["length"]}
     assert "rudder" in outcome({**BB2, "rudder": size})["refused"]
 
