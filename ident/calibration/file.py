@@ -37,7 +37,7 @@ _MOST = 10.0
 # What each method has factors of; the others have one.
 _FACTORS = {"carry_over": ("force", "roll"), "tail_downwash": ("force", "pitch")}
 # What the column ``estimated_by`` says of an estimate that a prior would bring in once more.
-_IN_FORCE = {"carry_over": "carry_over x", "tail_downwash": "downwash x"}
+_IN_FORCE = {"carry_over": "carry_over x", "tail_downwash": "downwash x|hull_below x"}
 
 
 class Training(Data):
@@ -75,9 +75,9 @@ class Prior(Data):
 
     ``version``: one (or no offset) within the error that the version states of the group, of runs and
     estimates together; ``captive`` is its older name. ``carry_over``: the vortex-lattice factor on force or
-    roll moment of the plane geometry. ``tail_downwash``: factor on force or pitch moment of the sail planes by their
-    vortices at the stern planes; both for a version of the runs alone. ``stated``: mean and sigma with their
-    reason. ``sigma`` widens the others where given.
+    roll moment of the plane geometry. ``tail_downwash``: factor on force or pitch moment of the sail planes by
+    the hull below them and their vortices at the stern planes; both for a version of the runs alone. ``stated``:
+    mean and sigma with their reason. ``sigma`` widens the others where given.
 
     Attributes
     ----------
@@ -307,9 +307,10 @@ def _estimated(prior: Prior, vehicle: Vehicle, rows: pd.DataFrame) -> tuple[floa
     from ident.estimates.downwash import tail_downwash
 
     tail = tail_downwash(vehicle, rows, planes)
-    if prior.of == "force":
-        return tail.force_factor, tail.force_sigma, tail.method
-    return tail.moment_factor, tail.moment_sigma, tail.method
+    factor, sigma = (
+        (tail.force_factor, tail.force_sigma) if prior.of == "force" else (tail.moment_factor, tail.moment_sigma)
+    )
+    return factor + planes.below, float(np.hypot(sigma, planes.below_sigma)), tail.method
 
 
 def _prior(

@@ -48,6 +48,11 @@ def without(
             raise InputError(where, "a version of the runs alone", "a version with estimates")
         given = commit.stored("given", {})
         yaw = given.get("pure_yaw")
-        stored = Given(given.get("speed", {}), (yaw[0], yaw[1]) if yaw else None, complete=given.get("complete", False))
+        stored = Given(
+            given.get("speed", {}),
+            (yaw[0], yaw[1]) if yaw else None,
+            complete=given.get("complete", False),
+            propelled=given.get("propelled", False),
+        )
         rows, _ = predicted(vehicle, measured_rows(rows), stored, estimates)
     return rows[~rows["coefficient"].isin(terms)].reset_index(drop=True)

@@ -5,7 +5,8 @@ loads its fixed root, the hull and the other fins. A vortex lattice (Katz and Pl
 Low-Speed Aerodynamics, ch. 12) of the fins, with the hull as a circular cylinder by image
 vortices (Milne-Thomson's circle theorem), gives the ratio; it generalises the factors
 K_W(B) and K_B(W) of Pitts, Nielsen and Kaattari (1957), NACA Report 1307, to a plane outboard
-of a fixed root. Planes on the wall of a sail are mirrored in it.
+of a fixed root. Planes on the wall of a sail are mirrored in it; what they load on the hull below is that of their
+images in it.
 
 By the reverse-flow theorem the moving plane's own load from hull incidence is the same
 ratio above that from its own deflection, so the factor belongs to both.
@@ -13,6 +14,7 @@ ratio above that from its own deflection, so the factor belongs to both.
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -33,6 +35,14 @@ _COARSE = (4, 7, 4)
 
 
 @dataclass(frozen=True)
+class FinShape:
+    """Form of a plane with its root: aspect ratio with the wall as a mirror, and tip over root chord."""
+
+    aspect: float
+    taper: float
+
+
+@dataclass(frozen=True)
 class CarryOver:
     """Ratios of everything a deflected plane loads to its own load, with standard deviations.
 
@@ -42,10 +52,13 @@ class CarryOver:
     roll_factor, roll_sigma : Roll moment about the hull's axis.
     incidence_factor : Load of the moving plane by hull incidence on that by its deflection.
     sail_factor, sail_sigma : Lift of the sail planes with their fixed roots.
+    below, below_sigma : Load on the hull below the sail planes; against their lift, so below zero.
     sail_tip : Distance of the sail planes' tips from the centre plane [m].
     lift_slope : Of the moving stern plane on its own area, by the lattice [1/rad].
     area : Of a moving stern plane [m^2].
     parts : Shares of root, hull and other fins in ``force_factor``.
+    radii : Distance from the hull's axis of plane, root, hull and other fins [m].
+    stern_fin, sail_fin : Form of a plane with its root.
     method : One line.
     """
 
@@ -56,10 +69,15 @@ class CarryOver:
     incidence_factor: float
     sail_factor: float
     sail_sigma: float
+    below: float
+    below_sigma: float
     sail_tip: float
     lift_slope: float
     area: float
     parts: dict[str, float]
+    radii: dict[str, float]
+    stern_fin: FinShape
+    sail_fin: FinShape
     method: str
 
 
@@ -115,6 +133,30 @@ def wall_factor(fin: Fin, wall: float, counts: tuple[int, int, int] = FINE) -> f
     circulation = np.linalg.solve(matrix, np.where(grid.moving, -1.0, 0.0))
     loads = normal_load(circulation, grid.a, grid.b, grid.normal[0])
     return float(loads.sum() / loads[grid.moving].sum())
+
+
+def hull_below(fin: Fin, wall: float, height: float, radius: float, counts: tuple[int, int, int] = FINE) -> float:
+    """Load on the hull below a deflected plane that stands off its centre plane, on the plane's own.
+
+    The images of the plane's vortices in the hull carry it (Milne-Thomson's circle theorem), as those of stern planes
+    do; above the hull an image is wider outboard than inboard, so that its load is against the plane's. A vortex from
+    y1 to y2 gives -a^2 (y2 / r2^2 - y1 / r1^2) / (y2 - y1). By the reverse-flow theorem it is what the hull's
+    flow takes off the plane's load by incidence.
+
+    Parameters
+    ----------
+    fin, wall : As of ``wall_factor``; the spans are distances from the boat's centre plane [m].
+    height : Of the plane over the hull's axis [m].
+    radius : Of the hull [m].
+    counts : Panels, see ``lattice``.
+    """
+    grid = lattice([fin], counts)
+    matrix = influence(grid, in_wall(grid.b, wall), in_wall(grid.a, wall))
+    circulation = np.linalg.solve(matrix, np.where(grid.moving, -1.0, 0.0))
+    own = normal_load(circulation, grid.a, grid.b, grid.normal[0])[grid.moving].sum()
+    above = np.array([0.0, 0.0, height])
+    image_a, image_b = in_cylinder(grid.b + above, radius), in_cylinder(grid.a + above, radius)
+    return float(normal_load(circulation, image_a, image_b, grid.normal[0]).sum() / own)
 
 
 def foils_of(vehicle: Vehicle, path: Path) -> tuple[pd.DataFrame, pd.DataFrame]:
@@ -217,6 +259,7 @@ def carry_over(vehicle: Vehicle) -> CarryOver:
     middle = float(np.mean(radii))
     factors = [stern_factors(_stern_fins(foils, g, a), a) for g, a in ((0.5, r) for r in radii)]
     factors += [stern_factors(_stern_fins(foils, g, middle), middle) for g in (0.0, 1.0)]
+    first = _stern_fins(foils, 0.5, middle)[0]
     best = stern_factors(_stern_fins(foils, 0.5, middle), middle)
     coarse = stern_factors(_stern_fins(foils, 0.5, middle), middle, _COARSE)
 
@@ -230,6 +273,7 @@ def carry_over(vehicle: Vehicle) -> CarryOver:
     walls = np.interp(chord, sail["x_m"], sail["y_wall_m"])
     wall = float(walls.mean())
     by_wall = [wall_factor(_sail_fin(plane, w), w) for w in (float(walls.min()), float(walls.max()))]
+    below, below_sigma = _below(_sail_fin(plane, wall), wall, float(plane["base_z_m"]), hull)
     return CarryOver(
         force_factor=best["force"],
         force_sigma=sigma("force"),
@@ -238,15 +282,43 @@ def carry_over(vehicle: Vehicle) -> CarryOver:
         incidence_factor=best["incidence"],
         sail_factor=wall_factor(_sail_fin(plane, wall), wall),
         sail_sigma=0.25 * abs(by_wall[0] - by_wall[1]),
+        below=below,
+        below_sigma=below_sigma,
         sail_tip=float((0.5 * (on_sail["LE_tip_s_m"] + on_sail["TE_tip_s_m"])).mean()),
-        lift_slope=2.0 * best["plane"] / _area(_stern_fins(foils, 0.5, middle)[0]),
-        area=_area(_stern_fins(foils, 0.5, middle)[0]),
+        lift_slope=2.0 * best["plane"] / _area(first),
+        area=_area(first),
         parts={k: best[k] for k in ("root", "hull", "others")},
+        radii=_radii(first, middle),
+        stern_fin=_shape(first),
+        sail_fin=_shape(_sail_fin(plane, wall)),
         method="vortex lattice of the fins with the hull as a cylinder by images (after NACA Report 1307)",
     )
 
 
-def _area(fin: Fin) -> float:
-    """Planform area of the moving plane [m^2]."""
-    (s0, lead0, trail0), (s1, lead1, trail1) = fin.chords[1:]
-    return 0.5 * (trail0 - lead0 + trail1 - lead1) * (s1 - s0)
+def _below(fin: Fin, wall: float, height: float, hull: Hull) -> tuple[float, float]:
+    """Load on the hull below the sail planes, and its deviation: a section between its half breadth and its deck."""
+    station = np.array([0.5 * (fin.chords[1][1] + fin.chords[1][2])])
+    around = np.ravel(hull.radius(station, np.radians(np.arange(0.0, 181.0, 15.0))))
+    sides = [hull_below(fin, wall, height, float(r)) for r in (around[len(around) // 2], around[0])]
+    return hull_below(fin, wall, height, float(around.mean())), 0.25 * abs(sides[0] - sides[1])
+
+
+def _area(fin: Fin, first: int = 1) -> float:
+    """Planform area of the moving plane, or of what begins at another of the chords [m^2]."""
+    return sum(
+        0.5 * (trail0 - lead0 + trail1 - lead1) * (s1 - s0)
+        for (s0, lead0, trail0), (s1, lead1, trail1) in itertools.pairwise(fin.chords[first:])
+    )
+
+
+def _shape(fin: Fin) -> FinShape:
+    """Aspect ratio with the mirror image of the whole fin, and taper."""
+    (s0, lead0, trail0), (s1, lead1, trail1) = fin.chords[0], fin.chords[-1]
+    return FinShape(2.0 * (s1 - s0) ** 2 / _area(fin, 0), (trail1 - lead1) / (trail0 - lead0))
+
+
+def _radii(fin: Fin, hull: float) -> dict[str, float]:
+    """Middle of plane and root, and the hull's surface, from the axis [m]; other fins are as the plane."""
+    root, gap, tip = (chord[0] for chord in fin.chords)
+    outer = 0.5 * (gap + tip)
+    return {"plane": outer, "root": 0.5 * (root + gap), "hull": hull, "others": outer}

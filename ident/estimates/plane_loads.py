@@ -134,6 +134,7 @@ def forward_planes(draft: Draft) -> str:
     except (InputError, KeyError) as error:
         raise NotApplicable(str(error)) from error
     force, moment = float(downwash.force_factor), float(downwash.moment_factor)
+    draft.memo["forward planes"] = (force, moment)
     for term, factor, sigma, unknown in (
         ("Z_d*", force, downwash.force_sigma, "tail_downwash force"),
         ("M_d*", moment, downwash.moment_sigma, "tail_downwash moment"),
@@ -141,3 +142,30 @@ def forward_planes(draft: Draft) -> str:
         of_term = draft.where([term], forward)
         draft.multiply(of_term, factor, sigma, unknown, f"downwash x{factor:.3f}", at_neutral(draft, of_term))
     return f"heave x{force:.3f} +- {downwash.force_sigma:.3f}, pitch x{moment:.3f} +- {downwash.moment_sigma:.3f}"
+
+
+def hull_below(draft: Draft) -> str:
+    """What deflected sail planes load on the hull below them, by their images in it.
+
+    It acts at the planes' station, where the hull is a cylinder. What their vortices do where the hull ends is left
+    out, as in NACA Report 1307.
+
+    Raises
+    ------
+    NotApplicable
+        Without sail planes, or without the geometry.
+    """
+    forward = [p.name for p in draft.vehicle.forward_planes]
+    if not draft.where(["[ZM]_d*"], forward).any():
+        raise NotApplicable("no loads of sail planes by part")
+    try:
+        planes = planes_of(draft)
+    except InputError as error:
+        raise NotApplicable(str(error)) from error
+    before = draft.memo.get("forward planes", (1.0, 1.0))
+    assert isinstance(before, tuple)
+    for term, own in zip(("Z_d*", "M_d*"), before, strict=True):
+        of_term, factor = draft.where([term], forward), 1.0 + planes.below / own
+        word = f"hull_below x{factor:.3f}"
+        draft.multiply(of_term, factor, planes.below_sigma / own, "hull below", word, at_neutral(draft, of_term))
+    return f"{planes.below:+.3f} +- {planes.below_sigma:.3f} of the planes' own load"

@@ -16,13 +16,15 @@ from typing import TYPE_CHECKING
 from ident.estimates.draft import Draft, NotApplicable
 from ident.estimates.extrapolation import extrapolation
 from ident.estimates.facility import axial_in_drift, shared_errors
+from ident.estimates.fin_lift import fin_lift
 from ident.estimates.lines import from_lines
 from ident.estimates.pitching import pure_pitch
-from ident.estimates.plane_loads import carried_over, forward_planes
+from ident.estimates.plane_loads import carried_over, forward_planes, hull_below
 from ident.estimates.potential import unmeasured
 from ident.estimates.roll import roll_damping
 from ident.estimates.sail_vortex import sail_vortex
 from ident.estimates.saturation import saturation
+from ident.estimates.suction import propeller_suction
 from ident.estimates.turning import Given, cross_flow, even_loads
 from sim.boat.vehicle import Vehicle
 from sim.files.errors import InputError
@@ -54,9 +56,12 @@ _WORK: dict[str, Callable[[Draft, Given], str]] = {
     "shared_errors": shared_errors,
     "axial_in_drift": lambda draft, given: axial_in_drift(draft),
     "extrapolation": lambda draft, given: extrapolation(draft),
+    "fin_lift": lambda draft, given: fin_lift(draft),
     "saturation": lambda draft, given: saturation(draft),
     "carry_over": lambda draft, given: carried_over(draft),
+    "propeller_suction": propeller_suction,
     "tail_downwash": lambda draft, given: forward_planes(draft),
+    "hull_below": lambda draft, given: hull_below(draft),
     "sail_vortex": lambda draft, given: sail_vortex(draft),
     "cross_flow": cross_flow,
     "pure_pitch": pure_pitch,

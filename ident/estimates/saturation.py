@@ -14,7 +14,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from ident.estimates.draft import Draft, NotApplicable
+from ident.estimates.draft import Draft, Mask, NotApplicable
 
 Array = NDArray[np.float64]
 
@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 # angle; each with its deviation. The runs' is the wider: the grid, and steps of 10 deg between them.
 _EXPERIMENT, _RUNS = (22.0, 4.0), (10.0, 8.0)
 # Lift goes on straight up to here in the runs [deg].
-_STRAIGHT = 10.0
+STRAIGHT = 10.0
 _WORD = "lift_continued"
 
 
@@ -58,16 +58,16 @@ def saturation(draft: Draft) -> str:
         When no load was continued.
     """
     rows, angle = draft.rows, draft.axis("delta")
-    continued = draft.where(["[YZKMN]_d*"]) & rows["quality"].eq(_WORD).to_numpy() & (np.abs(angle) > _STRAIGHT)
+    continued = continued_rows(draft)
     if not continued.any():
         raise NotApplicable(f"no plane load beyond the runs (quality {_WORD})")
     mean, sigma = saturation_angle()
-    base_of = _at_straight(draft)
+    base_of = at_straight(draft)
     change, lost = np.zeros(len(rows)), np.zeros(len(rows))
     for i in np.flatnonzero(continued):
         straight, full = abs(float(angle[i])), float(draft.value[i])
         base = base_of(int(i))
-        slope = (full - base) / (straight - _STRAIGHT)
+        slope = (full - base) / (straight - STRAIGHT)
         change[i] = slope * (reached(straight, mean, sigma) - straight)
         up, down = (reached(straight, mean + d, 0.5 * sigma) for d in (0.5 * sigma, -0.5 * sigma))
         lost[i] = slope * (up - down)
@@ -76,17 +76,23 @@ def saturation(draft: Draft) -> str:
     return f"lift saturates at {mean:.1f} +- {sigma:.1f} deg"
 
 
-def _at_straight(draft: Draft) -> Callable[[int], float]:
+def continued_rows(draft: Draft) -> Mask:
+    """(n,) True for loads beyond the straight part that the campaign carried on."""
+    carried_on = draft.rows["quality"].eq(_WORD).to_numpy() & (np.abs(draft.axis("delta")) > STRAIGHT)
+    return draft.where(["[YZKMN]_d*"]) & carried_on
+
+
+def at_straight(draft: Draft) -> Callable[[int], float]:
     """Of a row: the load of the same plane, speed and depth at the end of the straight part."""
     rows, angle = draft.rows, draft.axis("delta")
     side = np.sign(angle)
     columns = [rows[c].tolist() for c in ("coefficient", "part", "speed_mps", "depth_m")]
     keys = list(zip(*columns, side.tolist(), strict=True))
-    ends = {keys[i]: i for i in reversed(np.flatnonzero(np.isclose(angle, side * _STRAIGHT)).tolist())}
+    ends = {keys[i]: i for i in reversed(np.flatnonzero(np.isclose(angle, side * STRAIGHT)).tolist())}
 
     def base(i: int) -> float:
         if keys[i] not in ends:
-            raise NotApplicable(f"{keys[i][0]}: no run at {_STRAIGHT:g} deg")
+            raise NotApplicable(f"{keys[i][0]}: no run at {STRAIGHT:g} deg")
         return float(draft.value[ends[keys[i]]])
 
     return base

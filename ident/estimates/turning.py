@@ -50,12 +50,14 @@ class Given:
     pure_yaw : Share of pure yaw taken off by the source and its deviation; None when pure yaw was measured.
     shared : Errors that runs have in common.
     complete : Whether a published set is completed from the vehicle's lines.
+    propelled : Whether loads of planes were measured with the propeller at work.
     """
 
     speed: dict[str, float] = field(default_factory=dict)
     pure_yaw: tuple[float, float] | None = None
     shared: tuple[Shared, ...] = ()
     complete: bool = False
+    propelled: bool = False
 
 
 def hull_strips(draft: Draft, vertical: bool = False) -> Strips:

@@ -124,7 +124,9 @@ def given_of(campaign: Campaign) -> Given:
             raise InputError(where, f"no run of {' '.join(one.tests + one.parts)}", "tests and parts of the campaign")
         shared.append(Shared(one.name, one.relative, frozenset(chosen["run_id"].astype(str)), tuple(one.loads)))
     yaw = (header.pure_yaw.taken_off, header.pure_yaw.sigma) if header.pure_yaw else None
-    return Given(speed, yaw, tuple(shared), header.complete_from == "lines")
+    planes = runs[runs["test"] == "plane_deflection"]
+    propelled = bool((planes["n"] > 0.0).any()) if "n" in planes else False
+    return Given(speed, yaw, tuple(shared), header.complete_from == "lines", propelled)
 
 
 def completed(campaign: Campaign, rows: pd.DataFrame) -> pd.DataFrame:
@@ -150,6 +152,7 @@ def metadata(
 ) -> dict[str, str]:
     """What a commit carries beside its rows: provenance, inputs, conversions, estimates, notes of the fit."""
     header, given = campaign.header, given_of(campaign)
+    propelled = {"propelled": True} if given.propelled else {}
     # A version that was fitted without an error of the checks does not carry the key.
     forced = {"forced": force.strip()} if any(f.severity == "error" for f in findings) else {}
     return (
@@ -167,7 +170,9 @@ def metadata(
             "quality": json.dumps({k: q.model_dump() for k, q in header.quality.items()}),
             "checks": json.dumps([f.as_json() for f in findings]),
             "estimates": json.dumps([vars(e) for e in estimates]),
-            "given": json.dumps({"speed": given.speed, "pure_yaw": given.pure_yaw, "complete": given.complete}),
+            "given": json.dumps(
+                {"speed": given.speed, "pure_yaw": given.pure_yaw, "complete": given.complete} | propelled
+            ),
             "message": message,
         }
         | forced
