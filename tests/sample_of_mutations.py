@@ -44,6 +44,7 @@ STARTER = ROOT / "ident" / "starter" / "files"
 HMRI = ROOT.parent / "shared" / "datasets" / "kvlcc2_hmri_pmm"
 # The starter's campaign file as far as its tables of runs; histories take their time.
 TABLES = re.compile(r"(?s).*?files = \"\*\.csv\"\n")
+# Seconds of a processor, whoever else works beside.
 SLOWEST = 60
 
 
@@ -205,7 +206,7 @@ def one(subject: Subject, seed: int, db: Path) -> dict[str, object]:
                     if not d.startswith(("---", "+++", "@@"))][:8]  # fmt: skip
     path.write_bytes(made.encode("utf-8", "surrogateescape"))
     begun = time.monotonic()
-    signal.alarm(SLOWEST)
+    signal.setitimer(signal.ITIMER_PROF, SLOWEST)
     try:
         values, findings, no = outcome(subject.folder)
         if seed % 50 == 0:
@@ -223,7 +224,7 @@ def one(subject: Subject, seed: int, db: Path) -> dict[str, object]:
     except Exception:
         line |= {"what": "fault", "text": traceback.format_exc()[-3000:]}
     finally:
-        signal.alarm(0)
+        signal.setitimer(signal.ITIMER_PROF, 0.0)
         path.write_bytes(text.encode("utf-8", "surrogateescape"))
     line["s"] = round(time.monotonic() - begun, 2)
     return line
@@ -240,7 +241,7 @@ def main() -> None:
     parser.add_argument("--sample", type=int, default=0)
     parser.add_argument("--only", default="", help="Campaigns whose name begins with it.")
     given = parser.parse_args()
-    signal.signal(signal.SIGALRM, refused)
+    signal.signal(signal.SIGPROF, refused)
     _files_kept()
     counts: collections.Counter[tuple[str, str]] = collections.Counter()
     with tempfile.TemporaryDirectory() as folder, given.log.open("a", encoding="utf-8") as out:

@@ -96,6 +96,18 @@ def test_an_xlsx_of_another_writer(tmp_path):
     assert_values(runs_of(tmp_path, "runs.xlsx"))
 
 
+def test_a_formula_whose_result_was_never_stored_is_no_blank_cell(tmp_path):
+    book(tmp_path, "runs.xlsx", [NAMES, [2, "=-1000-234.5", 2750.25, 12500.0]], more="notes")
+    with pytest.raises(InputError, match=r"row 2, column X_N: a formula without its result"):
+        runs_of(tmp_path, "runs.xlsx", 'table = "drift"')
+
+
+def test_rows_of_a_worksheet_are_counted_with_its_empty_ones(tmp_path):
+    book(tmp_path, "runs.xlsx", [NAMES, *RUNS.tolist(), [], ["average", -1, 2, 3]])
+    with pytest.raises(InputError, match=r"row 6, column beta_deg"):
+        runs_of(tmp_path, "runs.xlsx")
+
+
 # -- MATLAB, HDF5, netCDF ----------------------------------------------------------------------------
 
 

@@ -236,6 +236,17 @@ def test_what_an_oscillation_needs_is_asked_for(tmp_path, reduction, words):
     assert words in str(caught.value)
 
 
+@pytest.mark.parametrize(("stated", "words"), [(2.0 * np.pi * 0.25, "rad/s for Hz"), (4.0, "0.25"), (15.0, "0.25")])
+def test_a_frequency_in_other_units_is_refused(tmp_path, stated, words):
+    """rad/s, a period, cycles a minute: the record oscillates elsewhere, however far from what is stated."""
+    t, _, y, _ = sway(0.0)
+    reduction = OSCILLATORY.replace("frequency_hz = 0.25", f"frequency_hz = {stated}") + "amplitude = 0.2\n"
+    campaign(tmp_path, history("pmm.csv", constants=QUIET, reduction=reduction))
+    (tmp_path / "pmm.csv").write_text("time_s,Y_N\n" + "\n".join(f"{a},{b}" for a, b in zip(t, y, strict=True)))
+    with pytest.raises(InputError, match="Y oscillates at 0.25 Hz.*" if "for" not in words else words):
+        read_campaign(tmp_path)
+
+
 def test_constant_acceleration_gives_the_load_at_mid_time(tmp_path):
     """X = -c U^2 - m a with U = U0 + a t: value and acceleration at the middle of the record."""
     t = np.arange(0.0, 20.0, 0.01)

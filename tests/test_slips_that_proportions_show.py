@@ -27,7 +27,7 @@ KNOT = 1852.0 / 3600.0
 POUND = 4.4482216152605
 CHECKS = (
     *("added_lever", "added_mass", "area", "between_tests", "draught", "friction", "lift", "moment_point", "munk"),
-    "zero_reading",
+    *("zero_reading", "open_water", "essential"),
 )
 
 
@@ -74,6 +74,22 @@ def test_a_unit_or_a_zero_of_one_column_is_found(starter, tmp_path, name, column
     shutil.copytree(starter, tmp_path / "boat")
     scaled(tmp_path / "boat" / "captive" / f"{name}.csv", column, factor, more)
     assert check in seen(tmp_path / "boat" / "captive")
+
+
+def test_a_value_typed_into_the_next_row_of_an_open_water_curve_is_found(starter, tmp_path):
+    shutil.copytree(starter, tmp_path / "boat")
+    path = tmp_path / "boat" / "captive" / "open_water.csv"
+    text = path.read_text("utf-8")
+    assert "0.6,0.21," in text
+    path.write_text(text.replace("0.6,0.21,", "0.6,0.3,"), "utf-8")
+    assert seen(tmp_path / "boat" / "captive") == {"open_water"}
+
+
+def test_a_turn_without_the_moment_that_opposes_it_is_found(starter, tmp_path):
+    shutil.copytree(starter, tmp_path / "boat")
+    path = tmp_path / "boat" / "captive" / "arm_q.csv"
+    pd.read_csv(path, dtype=str, keep_default_na=False).drop(columns="M_Nm").to_csv(path, index=False)
+    assert seen(tmp_path / "boat" / "captive") == {"essential"}
 
 
 @pytest.mark.parametrize("factor", [KNOT, 1.0 / KNOT])

@@ -19,6 +19,8 @@ from sim.files.errors import InputError
 _OFF = 0.05
 _SURE = 4.0
 _DRIFT = 2e-3
+# Share of a channel's scatter that a line away from the stated frequency has to hold, and its cycles: a drift is none.
+_CLEAR, _CYCLES = 0.9, 4.0
 # A clock that starts later than so many steps does not start with the motion.
 _LATE = 1.5
 
@@ -35,6 +37,11 @@ def line_of(pieces: Timed, names: list[str], frequency: float | None, channels: 
     if frequency is None and "displacement" not in names:
         raise InputError(str(channels.path), "no frequency", "frequency_hz in [source.reduction], or frequency")
     line = estimate(time, values[:, chosen], weight, frequency) if time.size else None
+    if line is None and frequency is not None and time.size:
+        # Nothing there: a line elsewhere that is nearly all of a channel says that another frequency was meant.
+        line = estimate(time, values[:, chosen], weight, None)
+        clear = line is not None and line.share > _CLEAR and line.frequency * (time[-1] - time[0]) > _CYCLES
+        line = line if clear else None
     return None if line is None else replace(line, channel=chosen[line.channel])
 
 
@@ -52,6 +59,7 @@ def frequency_of(
     off = abs(line.frequency - stated)
     if off > _OFF * stated:
         wrong = f"frequency_hz = {stated:g}, and {names[line.channel]} oscillates at {line.frequency:.5g} Hz"
+        wrong += " (rad/s for Hz?)" if abs(2.0 * math.pi * line.frequency - stated) < _OFF * stated else ""
         raise InputError(str(channels.path), wrong, f"the frequency of the motion, to {100 * _OFF:g} %")
     drift = off * span_of(channels, rule)
     return (line.frequency, stated) if off > _SURE * line.stderr and drift > _DRIFT else (stated, None)

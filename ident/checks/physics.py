@@ -307,6 +307,36 @@ def thrust_that_rises(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
 
 
 @check("open_water")
+def thrust_off_the_curve(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
+    """KT and KQ between their neighbours in J: a curve of a propeller has no step."""
+    runs = evidence.runs
+    ahead = runs[(runs["J"] >= 0.0) & (runs["test"] == "open_water")]
+    for file, group in ahead.groupby("file", sort=False):
+        for name in ("KT", "KQ"):
+            given = group[kept(group, name)].sort_values("J")
+            j, value = given["J"].to_numpy(float), given[name].to_numpy(float)
+            if len(j) < 4 or np.unique(j).size < len(j):
+                continue
+            # A parabola through the four nearest others, which a propeller's curve is within a few per cent.
+            off = np.array([value[i] - _through_others(j, value, i) for i in range(len(j))])
+            error = given[f"s_{name}"].fillna(0.0).to_numpy(float)
+            far = np.abs(off) > rule.limits["step"] * np.abs(value).max() + 3.0 * error
+            if far.any():
+                worst = int(np.abs(off).argmax())
+                at = given.iloc[worst]
+                what = f"{name} = {at[name]:.4g} at J = {at['J']:g} in run {at['run_id']} (or a neighbour's), "
+                what += f"{off[worst]:+.2g} off the curve through the others"
+                yield rule.finding(str(file), [int(at["row"])], [name], what, "warning")
+
+
+def _through_others(j: np.ndarray, value: np.ndarray, i: int) -> float:
+    """A parabola through the four points nearest to one of them, at it; a straight line through three."""
+    near = np.argsort(np.abs(j - j[i]), kind="stable")
+    near = near[near != i][:4]
+    return float(np.polyval(np.polyfit(j[near] - j[i], value[near], 2 if len(near) > 3 else 1), 0.0))
+
+
+@check("open_water")
 def one_advance(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
     """Speed and revolutions beside the advance coefficient: J = U/(nD), whatever the size of the model."""
     runs = evidence.runs

@@ -64,7 +64,8 @@ def resistance_over_friction(evidence: Evidence, rule: Rule) -> Iterator[Finding
         words = "less than the friction of a flat plate of that surface" if low else "more than a streamlined boat has"
         what = f"X is {float(np.median(share)):.2g} times the ITTC friction of the least surface of that length and "
         what += f"volume, {words}: the unit of speed or X, scale, density, or thrust in X?"
-        yield rule.finding(str(file), rows_of(group), ["X", "U"], what, "" if low else "warning")
+        none = low and bool((resistance < limits["none"] * plate).all())
+        yield rule.finding(str(file), rows_of(group), ["X", "U"], what, "error" if none else "")
 
 
 @check("between_tests")

@@ -233,6 +233,19 @@ def loads_a_boat_needs(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
         yield rule.finding("campaign.toml", [], ["absent"], f"{name!r} is declared absent; known are {known}")
 
 
+@check("essential")
+def damping_of_turns(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
+    """Turns of the hull about an axis, none of whose runs gives the moment that opposes them."""
+    for file, group in evidence.runs.groupby("file", sort=False):
+        turning = group[group["test"].isin(["rotating_arm", "pure_rotation"]) & group["part"].isin(["hull", ""])]
+        for rate, moment in (("p", "K"), ("q", "M"), ("r", "N")):
+            others = [r for r in "pqr" if r != rate]
+            about = turning[(turning[rate].fillna(0.0) != 0.0) & (turning[others].fillna(0.0) == 0.0).all(axis=1)]
+            if len(about) > 1 and about[moment].isna().all():
+                what = f"none of {len(about)} runs that turn with {rate} gives {moment}, which opposes the turn"
+                yield rule.finding(str(file), about["row"], [moment], what, "warning")
+
+
 def _unsymmetric(runs: pd.DataFrame, output: str) -> bool:
     """Whether runs include a state in which a load may not vanish by symmetry: a flow angle in its plane."""
     angle = {"Y": "beta", "N": "beta", "Z": "alpha", "M": "alpha"}.get(output)

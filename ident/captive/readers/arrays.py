@@ -67,7 +67,9 @@ def chosen(path: Path, names: Sequence[str], source: Source, what: str) -> str:
     return names[0]
 
 
-def array_sheet(path: Path, names: Sequence[str], columns: Sequence[Any], source: Source, first_row: int = 1) -> Sheet:
+def array_sheet(
+    path: Path, names: Sequence[str], columns: Sequence[Any], source: Source, rows: Sequence[int] | int = 1
+) -> Sheet:
     """A sheet over columns in memory: arrays of numbers, or lists of cells (numbers, text, blanks).
 
     Parameters
@@ -75,24 +77,32 @@ def array_sheet(path: Path, names: Sequence[str], columns: Sequence[Any], source
     path, source : For the checks.
     names : Headers.
     columns : Of equal length.
-    first_row : Row of the first value, for messages.
+    rows : Rows of the values in the file, for messages; or the first of rows without a gap.
     """
     header = [str(n) for n in names]
     once(f"{path} (columns)", header, source)
     length = len(columns[0]) if columns else 0
+    places = range(rows, rows + length) if isinstance(rows, int) else rows
+    first_row = places[0] if length else 1
 
     def values(wanted: list[int], clock: int = -1) -> Iterator[Array]:
         clocks = Clocks()
         for at in range(0, length, _BLOCK):
             block = [
-                _numbers(path, first_row + at, header[i], columns[i][at : at + _BLOCK], clocks if i == clock else None)
+                _numbers(
+                    path,
+                    places[at : at + _BLOCK],
+                    header[i],
+                    columns[i][at : at + _BLOCK],
+                    clocks if i == clock else None,
+                )
                 for i in wanted
             ]
             yield np.stack(block, axis=1)
 
     def cells() -> Iterator[tuple[int, list[str]]]:
         for row in range(length):
-            yield first_row + row, [_written(column[row]) for column in columns]
+            yield places[row], [_written(column[row]) for column in columns]
 
     return Sheet(path, max(first_row - 1, 0), header, values, cells, _PLAIN, first_row)
 
@@ -112,7 +122,7 @@ def _written(cell: Any) -> str:
     return str(cell)
 
 
-def _numbers(path: Path, row: int, name: str, cells: Any, clocks: Clocks | None) -> Array:
+def _numbers(path: Path, rows: Sequence[int], name: str, cells: Any, clocks: Clocks | None) -> Array:
     """One column of some rows as finite numbers."""
     if isinstance(cells, np.ndarray) and cells.dtype.kind in "iuf":
         values = cells.astype(float)
@@ -128,7 +138,7 @@ def _numbers(path: Path, row: int, name: str, cells: Any, clocks: Clocks | None)
     bad = np.flatnonzero(~(np.abs(values) <= LARGEST))
     if bad.size:
         at = int(bad[0])
-        place = f"{path}, row {row + at}, column {name[:60]}"
+        place = f"{path}, row {rows[at]}, column {name[:60]}"
         shown = _written(cells[at]) or "nothing"
         raise InputError(place, repr(shown[:60]), f"a finite number of at most {LARGEST:g}")
     return values

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import datetime
+import re
+import zipfile
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +13,11 @@ from ident.captive.readers.arrays import array_sheet, chosen, needs
 from ident.captive.readers.sheet import Sheet
 from ident.captive.source import Source
 from sim.files.errors import InputError
+
+# A cell of a worksheet with a formula and no value behind it; one of a shared formula may be empty itself.
+_BARE = re.compile(rb'<c r="([A-Z]+)([0-9]+)"[^>]*>\s*<f(?:\s[^>]*)?(?:/>|>[^<]*</f>)\s*(?:<v\s*/>|<v>\s*</v>)?\s*</c>')
+# Bytes of a worksheet that is looked through for them.
+_LARGEST = 1 << 28
 
 
 def open_workbook(path: Path, source: Source) -> Sheet:
@@ -35,6 +42,25 @@ def open_workbook(path: Path, source: Source) -> Sheet:
     filled = [name for name, rows in sheets.items() if any(_filled(row) for row in rows)]
     name = chosen(path, filled, source, "worksheet")
     return _sheet(path, name, sheets[name], source)
+
+
+def _bare_formulas(path: Path) -> set[tuple[int, int]]:
+    """Row and column of the cells of all worksheets with a formula whose result was never stored: they read as blank.
+
+    Programs that write workbooks store the formula alone; Excel and LibreOffice store its result when they save.
+    """
+    found: set[tuple[int, int]] = set()
+    if not zipfile.is_zipfile(path):
+        return found
+    with zipfile.ZipFile(path) as packed:
+        for name in packed.namelist():
+            if re.match(r"xl/worksheets/[^/]+\.xml$", name) and packed.getinfo(name).file_size <= _LARGEST:
+                for letters, row in _BARE.findall(packed.read(name)):
+                    column = 0
+                    for letter in letters:
+                        column = 26 * column + letter - 64
+                    found.add((int(row), column))
+    return found
 
 
 def _visible(book: Any) -> list[str]:
@@ -70,8 +96,14 @@ def _sheet(path: Path, name: str, rows: list[list[Any]], source: Source) -> Shee
         raise InputError(f"{where}, row {top}", f"a column without a name ({lost[0] + 1})", "a name for every column")
     if not kept or not body:
         raise InputError(where, "no names with rows below them", "a row of names, and header_pattern below a title")
+    bare = _bare_formulas(path)
+    for i, row in body if bare else ():
+        blank = next((k for k in kept if (i, k + 1) in bare and (len(row) <= k or row[k] in (None, ""))), None)
+        if blank is not None:
+            text = "results stored with their formulas: open the file in Excel or LibreOffice and save it"
+            raise InputError(f"{where}, row {i}, column {names[blank][:60]}", "a formula without its result", text)
     columns = [[_cell(row[k]) if len(row) > k else None for _, row in body] for k in kept]
-    return array_sheet(path, [names[k] for k in kept], columns, source, body[0][0])
+    return array_sheet(path, [names[k] for k in kept], columns, source, [i for i, _ in body])
 
 
 def _joined(row: list[Any]) -> str:
