@@ -187,6 +187,9 @@ def show(of: BandSummary, console: Console) -> None:
     from rich.table import Table
 
     failed = f", {of.failed} without self-propulsion" if of.failed else ""
+    if not of.inside and not of.variance_shares:
+        console.print(f"{of.samples} samples{failed}; the case has no series to hold them against")
+        return
     table = Table("reference", "channel", "inside 50 %", "inside 95 %", title=f"{of.samples} samples{failed}")
     for source, channels in of.inside.items():
         for channel, by_level in channels.items():
