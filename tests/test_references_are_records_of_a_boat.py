@@ -144,6 +144,7 @@ def test_sources_that_nothing_names_and_holes_are_said(tmp_path):
     [
         (lambda t: t.drop(t.index[40]), "a gap from t = 39 to 41, usual steps are 1"),
         (lambda t: t.drop(t.index[141:161]), "psi at 140 end before the others, at t = 160"),
+        (lambda t: t.drop(t.index[0:20]), "psi at 20 begin after the others, at t = 0"),
         (lambda t: t.assign(value=t["value"].where(t.index != 503, 0.0)), "1 of 161 points of y are far from"),
         (lambda t: t.assign(sigma=t["sigma"] * 20.0), "standard errors of p that are"),
     ],

@@ -124,17 +124,34 @@ def check_records(case: Case, reference: Series, vehicle: Vehicle, where: str) -
     return said
 
 
+def check_records_of_flight(case: Case, vehicle: Vehicle, where: str) -> None:
+    """Refuse a flight whose records are so far apart that nothing can be measured on them.
+
+    Raises
+    ------
+    InputError
+        Naming the case's key, and the longest time between two records.
+    """
+    named, length = limits(), vehicle.particulars.length.value
+    slow = named["speed_from_rest"] * math.sqrt(case.environment.gravity_mps2 * length)
+    most = named["record_most"] * length / max(case.initial.speed_mps, slow)
+    if case.run.record_s > most:
+        allowed = f"{most:.3g} s at most, in which a boat of {length:g} m runs half its length"
+        raise InputError(f"{where}, key run.record_s", f"{case.run.record_s:g} s", allowed)
+
+
 def _shorter(channels: dict[str, Record], source: str, reference: Series) -> list[str]:
-    """Channels that end before the others of their source, in a file that somebody wrote."""
-    ends = {c: float(r.abscissa[-1]) for c, r in channels.items() if c in CHANNELS and len(r)}
-    last = max(ends.values(), default=0.0)
-    short = [c for c, end in ends.items() if end < (1.0 - limits()["ends_apart"]) * last]
-    if not reference.rows or not short:
+    """Channels that begin after or end before the others of their source, in a file that somebody wrote."""
+    kept = {c: r.abscissa for c, r in channels.items() if c in CHANNELS and len(r)}
+    if not reference.rows or len(kept) < 2:
         return []
-    at = ", ".join(f"{c} at {ends[c]:.4g}" for c in short)
-    return [
-        f"reference {source}: {at} end before the others, at {reference.abscissa} = {last:.4g}: is something missing?"
-    ]
+    first, last = min(float(a[0]) for a in kept.values()), max(float(a[-1]) for a in kept.values())
+    apart, name = limits()["ends_apart"] * (last - first), reference.abscissa
+    late = ", ".join(f"{c} at {a[0]:.4g}" for c, a in kept.items() if a[0] > first + apart)
+    short = ", ".join(f"{c} at {a[-1]:.4g}" for c, a in kept.items() if a[-1] < last - apart)
+    said = [f"{late} begin after the others, at {name} = {first:.4g}"] if late else []
+    said += [f"{short} end before the others, at {name} = {last:.4g}"] if short else []
+    return [f"reference {source}: {text}: is something missing?" for text in said]
 
 
 def _doubts(

@@ -90,6 +90,8 @@ def _far(record: Record) -> NDArray[np.bool_]:
     # A control that stands still between its steps leaves no usual distance.
     beside[1:-1] = (off > limits()["off_line"] * usual) & (usual > 0.0)
     # The neighbours of a misprint are off their lines by half of it.
+    step = np.diff(along)
+    beside[1:-1] &= np.maximum(step[1:], step[:-1]) < limits()["gap_of_even"] * float(np.median(step))
     beside[1:-1] &= off >= np.maximum(np.append(off[1:], 0.0), np.insert(off[:-1], 0, 0.0))
     return bad | beside
 

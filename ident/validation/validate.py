@@ -19,7 +19,7 @@ from ident.options import Conditions, OwnReference
 from ident.validation.boats import Boat, Fleet
 from ident.validation.coverage import outside_tables
 from ident.validation.other_boat import check_answers, for_boat, saturated
-from ident.validation.reference_limits import check_records
+from ident.validation.reference_limits import check_records, check_records_of_flight
 from ident.validation.reference_pairs import check_pairs, units_by_flight
 from ident.validation.references import beyond_the_run, check_reference, compared
 from ident.validation.result import ChannelError, Validation
@@ -321,6 +321,7 @@ def _held_against(
     flown, where = load_case(os.fspath(case))
     ship = load_vehicle(os.fspath(vehicle)) if vehicle is not None else load_vehicle(flown.vehicle, beside=where)
     flown, notes = for_boat(flown, where, ship, conditions)
+    check_records_of_flight(flown, ship, where)
     if reference is not None:
         stated = reference if isinstance(reference, OwnReference) else OwnReference(reference)
         held = _with_reference(flown, stated)

@@ -22,7 +22,9 @@ _LAWS = {"fixed": orders.FIXED, "pid": orders.PID, "zigzag": orders.ZIGZAG, "pro
 Angle = Annotated[float, Field(ge=-90.0, le=90.0)]
 # Gains steer back where they are positive; negative ones would drive away.
 Gain = Annotated[float, Field(ge=0.0)]
-# Of planes: with more, three hundredths of a degree or a metre off take them to their limit.
+# Of planes and propeller: with more, three hundredths of a degree or a metre off take them to their limit.
+# Angles of a zigzag [deg]: the smallest in use is 1/1; 20 deg as radians are 0.35.
+_LEAST_ZIGZAG = 0.5
 PlaneGain = Annotated[float, Field(ge=0.0, le=1000.0)]
 
 
@@ -179,6 +181,8 @@ class PlaneCommand(Data):
     def _zigzag_has_angles(self) -> PlaneCommand:
         if self.law == "zigzag" and not (self.first_deg and self.check_deg > 0.0):
             raise ValueError("a zigzag needs first_deg, not zero, and check_deg, positive")
+        if self.law == "zigzag" and min(abs(self.first_deg), self.check_deg) < _LEAST_ZIGZAG:
+            raise ValueError(f"first_deg and check_deg of {_LEAST_ZIGZAG:g} deg or more; radians?")
         return self
 
     @model_validator(mode="after")
@@ -235,9 +239,9 @@ class SpeedCommand(Data):
     """
 
     law: Literal["fixed", "pid", "programme"]
-    P_u: Gain = 0.0
-    I_u: Gain = 0.0
-    D_u: Gain = 0.0
+    P_u: PlaneGain = 0.0
+    I_u: PlaneGain = 0.0
+    D_u: PlaneGain = 0.0
     limits_rps: Annotated[list[float], Field(min_length=2, max_length=2)] | None = None
     step: list[SpeedStep] = Field(default_factory=list)
 

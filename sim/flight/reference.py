@@ -67,6 +67,15 @@ class Reference(Data):
             return data | {"frame": {"x": "forward", "y": "starboard", "z": "down"}}
         return data
 
+    @model_validator(mode="after")
+    def _each_once(self) -> Reference:
+        for key in ("compare", "channels", "from_start"):
+            given = getattr(self, key)
+            twice = sorted({name for name in given if given.count(name) > 1})
+            if twice:
+                raise ValueError(f"each once: {', '.join(twice)} stands twice in {key}")
+        return self
+
 
 class Published(Data):
     """A published value of one metric, and the relative deviation that is accepted.
