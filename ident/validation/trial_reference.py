@@ -95,7 +95,8 @@ def referenced(case: Case, where: str) -> Referenced:
     held = with_trial(case, folder / given.file, spec, given.controls == "recorded")
     compared = held.case.reference.channels if held.case.reference else []
     if missing := [c for c in given.channels if c not in compared]:
-        raise InputError(f"{where}, key reference.channels", ", ".join(missing), f"recorded: {', '.join(compared)}")
+        known = ", ".join(c for c in CHANNELS if c in held.series[TRIAL])
+        raise InputError(f"{where}, key reference.channels", ", ".join(missing), f"recorded: {known}")
     return held
 
 
