@@ -311,6 +311,18 @@ def test_folder_of_runs_gives_scatter_and_port_against_starboard(tmp_path):
     assert abs(gap["value"]) < 3.0 * gap["sigma"]
 
 
+def test_a_turn_to_port_that_mirrors_one_to_starboard_differs_in_nothing(tmp_path):
+    one = turn()
+    for side, sign in (("starboard", 1.0), ("port", -1.0)):
+        columns = {"t [s]": one["t"], "x_north [m]": one["x"], "y_east [m]": sign * one["y"]}
+        write(tmp_path / f"{side}.csv", columns | {"psi [deg]": sign * one["psi"]})
+    done = CliRunner().invoke(main, ["trial", str(tmp_path), "--json", "-"])
+    assert done.exit_code == 0, done.output
+    gaps = {r["metric"]: r["port_less_starboard"] for r in json.loads(done.output)["scatter"] if r["side"] == "port"}
+    assert {"yaw_rate_steady_degps", "drift_angle_steady_deg", "advance_90_heading_m"} <= set(gaps)
+    assert all(abs(gap["value"]) <= gap["sigma"] for gap in gaps.values())
+
+
 def test_columns_with_their_units_in_a_row_below_a_title(tmp_path):
     one = zigzag()
     lines = ["Basin test 201_004, zigzag", "scale 1", "TIME  PSI  R  DELTA", "[s]  [deg]  [deg/s]  [deg]"]

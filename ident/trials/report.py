@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 
 # What lies beside records in a folder and is none.
 _NO_RECORDS = {".toml", ".png", ".md", ".json", ".pdf", ".html", ".py", ".docx"}
+# Metrics of a turn whose sign is that of its side.
+_OF_THE_SIDE = ("drift_angle_", "yaw_rate_steady", "heel_")
 
 
 @dataclass(frozen=True)
@@ -99,7 +101,8 @@ class Scatter:
     mean : Of the runs.
     scatter : Standard deviation of a run; None for one run.
     stated : Root mean square of the runs' standard errors.
-    port_less_starboard : Difference of the sides' means, where both were run: with the port side's rows.
+    port_less_starboard : Difference of the sides' means, where both were run: with the port side's rows. Of drift, heel
+        and yaw rate in a turn, which have the sign of the side, the port side's are mirrored first.
     """
 
     maneuver: str
@@ -133,14 +136,18 @@ def scatter(trials: tuple[Trial, ...]) -> list[Scatter]:
             stated = float(np.sqrt(np.mean([v.sigma**2 for v in values])))
             spread = float(x.std(ddof=1)) if len(x) > 1 else None
             other = groups.get((maneuver, "starboard"), {}).get(name) if side == "port" else None
-            gap = _port_less_starboard(values, other, stated) if other else None
+            gap = _port_less_starboard(values, other, stated, name.startswith(_OF_THE_SIDE)) if other else None
             rows.append(Scatter(maneuver, side, name, len(x), float(x.mean()), spread, stated, values[0].unit, gap))
     return rows
 
 
-def _port_less_starboard(port: list[Value], starboard: list[Value], stated: float) -> Value:
-    """Difference of the means, its error by the scatter of the runs and at least that which is stated."""
+def _port_less_starboard(port: list[Value], starboard: list[Value], stated: float, mirrored: bool) -> Value:
+    """Difference of the means, its error by the scatter of the runs and at least that which is stated.
+
+    What has the sign of its side is ``mirrored`` first: a boat that turns alike to both sides has no difference.
+    """
     x, y = (np.array([v.value for v in side]) for side in (port, starboard))
+    x = -x if mirrored else x
     spread = [float(a.var(ddof=1)) if len(a) > 1 else stated**2 for a in (x, y)]
     error = math.sqrt(max(spread[0], stated**2) / len(x) + max(spread[1], stated**2) / len(y))
     return Value(float(x.mean() - y.mean()), error, port[0].unit)

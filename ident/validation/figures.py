@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ident.drawing import Margins, fixed_labels, place_panels
 from ident.output import whole
 from ident.text import in_figure
+from ident.validation.trial_reference import DRIVEN
 from sim.boat.database import version_words
 from sim.files.record import Record
 from sim.flight.simulation import CHANNELS, Simulation
@@ -118,6 +119,8 @@ def _flights(done: FlownCase) -> list[tuple[Simulation, dict[str, Any]]]:
     main = {"color": "tab:red", "lw": 1.6, "label": "simulated from the database"}
     as_started = [
         (flight, {"color": "tab:orange", "lw": 1.2, "ls": "-.", "label": f"simulated as {in_figure(source)} starts"})
+        if source != DRIVEN
+        else (flight, {"color": "tab:blue", "lw": 1.2, "ls": "--", "label": "simulated with the recorded controls"})
         for source, flight in done.as_started.items()
     ]
     return [(done.simulation, main), *as_started]
