@@ -7,9 +7,9 @@ import pytest
 from click.testing import CliRunner
 from trial_records import truth, turn, write, zigzag
 
+from ident.captive.unit_slips import factor_between
 from ident.cli import main
 from ident.trials.body import velocities
-from ident.trials.consistency import factor_between
 from ident.trials.spec import TrialFile, load_spec
 from ident.trials.trial import measure_trial
 from sim.files.errors import InputError

@@ -5,14 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache
-from importlib.resources import files
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
-from ident.captive.quantities import factor
+from ident.captive.unit_slips import factor_between
 from ident.checks.findings import Finding
 from ident.timeseries.noise import Samples
 from ident.timeseries.smoothing import SmoothPath, smooth
@@ -27,7 +24,7 @@ Array = NDArray[np.float64]
 RATES = {"r": "psi", "p": "phi", "q": "theta", "udot": "u"}
 _NAMES = {"r": "yaw rate", "p": "roll rate", "q": "pitch rate", "udot": "surge acceleration", "psi": "heading"}
 _NAMES |= {"phi": "heel", "theta": "pitch", "u": "speed ahead", "U": "speed"}
-_SAME, _LIKE, _ALIKE = 0.1, 0.06, 0.9
+_SAME, _ALIKE = 0.1, 0.9
 _MOST_DRIFT = math.radians(40.0)
 # What moves by less than so many standard errors of a sample lies still.
 _SCATTER = 6.0
@@ -48,28 +45,6 @@ class Pair:
     def agrees(self) -> bool:
         """One curve, within a tenth."""
         return self.correlation > _ALIKE and abs(self.slope - 1.0) < _SAME
-
-
-@cache
-def unit_slips() -> dict[str, float]:
-    """Pairs of units that are taken for one another -> their ratio, above one; from ``data/unit_slips.csv``."""
-    with (files("ident") / "data" / "unit_slips.csv").open(encoding="utf-8") as stream:
-        rows = pd.read_csv(stream)
-    ratios = {}
-    for like, unit, instead, words in zip(rows["like"], rows["unit"], rows["instead"], rows["words"], strict=True):
-        sizes = [factor(like, one) for one in (unit, instead)]
-        assert sizes[0] is not None, words
-        assert sizes[1] is not None, words
-        ratios[words] = sizes[0] / sizes[1]
-    return ratios
-
-
-def factor_between(ratio: float) -> tuple[float, str] | None:
-    """The unit slip that a ratio of two channels shows, and its factor; None for none."""
-    size = abs(ratio)
-    every = [(one, words) for words, value in unit_slips().items() for one in (value, 1.0 / value)]
-    one, words = min(every, key=lambda item: abs(math.log(max(size, 1e-300) / item[0])))
-    return (one, words) if abs(size / one - 1.0) < _LIKE else None
 
 
 def regressed(time: Array, value: Array, like: Array) -> Pair | None:

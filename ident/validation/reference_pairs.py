@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from ident.trials.consistency import factor_between
+from ident.captive.unit_slips import factor_between
 from ident.validation.reference_limits import Scales, limits, scales
 from ident.validation.trial_reference import TRIAL
 from sim.boat.vehicle import Vehicle
