@@ -132,6 +132,9 @@ def test_a_page_holds_every_name_and_no_element_of_it(text):
     assert page.count("'") == 2
 
 
+TRIAL = Path(__file__).parents[1] / "ident" / "starter" / "files" / "zigzag_trial.csv"
+
+
 @pytest.mark.skipif(os.name != "posix", reason="POSIX file names")
 @given(st.text(st.characters(exclude_characters="/\0", codec="utf-8"), min_size=1, max_size=30))
 def test_the_address_of_a_folder_is_the_folder_or_its_mirror(text):
@@ -270,6 +273,11 @@ def test_every_encoding_and_every_end_of_a_stream(tmp_path, fitted_db):
             assert (done.returncode, done.stdout) == (2, b""), (words, end)
     done = shell(f'"{sys.executable}" -m ident.cli --version >/dev/full', env)
     assert (done.returncode, done.stderr) == (2, b"Error: standard output: No space left on device\n")
+    (tmp_path / "here").mkdir()
+    relative = {**env, "XDG_CACHE_HOME": "of/mine", "XDG_CONFIG_HOME": "of/mine"}
+    drawn = f'cd "{tmp_path}/here"; "{sys.executable}" -m ident.cli trial "{TRIAL}" --figures "{tmp_path}/figures"'
+    assert shell(drawn, relative).returncode == 0
+    assert os.listdir(tmp_path / "here") == []
     gone = f'mkdir "{tmp_path}/gone"; cd "{tmp_path}/gone"; rmdir "{tmp_path}/gone"; {command}'
     done = shell(gone, env)
     assert done.returncode == 2

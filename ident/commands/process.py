@@ -60,6 +60,16 @@ def ready_streams() -> None:
             stream.reconfigure(errors="replace")
 
 
+def absolute_folders() -> None:
+    """Folders of the user that are no absolute path are not there, as the XDG Base Directory Specification says.
+
+    Libraries that take them as they stand would write into the working folder.
+    """
+    for name in ("XDG_CACHE_HOME", "XDG_CONFIG_HOME", "XDG_DATA_HOME"):
+        if not os.path.isabs(os.environ.get(name, "/")):
+            del os.environ[name]
+
+
 def silence(name: str) -> None:
     """Let what is left in a stream that takes nothing more vanish, so that the end of Python does not complain."""
     with contextlib.suppress(OSError, ValueError, AttributeError):
