@@ -146,6 +146,10 @@ def test_sources_that_nothing_names_and_holes_are_said(tmp_path):
         (lambda t: t.drop(t.index[141:161]), "psi at 140 end before the others, at t = 160"),
         (lambda t: t.drop(t.index[0:20]), "psi at 20 begin after the others, at t = 0"),
         (lambda t: t.assign(value=t["value"].where(t.index != 503, 0.0)), "1 of 161 points of y are far from"),
+        (
+            lambda t: t.assign(value=t["value"].where((t["channel"] != "p") | (t["t"] < 85.0), -t["value"])),
+            "phi and what p leads to do not go together",
+        ),
         (lambda t: t.assign(sigma=t["sigma"] * 20.0), "standard errors of p that are"),
     ],
 )

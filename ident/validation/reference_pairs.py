@@ -33,26 +33,35 @@ _EXPECTED: tuple[tuple[str, str, Callable[[Array, Scales], Array]], ...] = (
 )
 
 
-def check_pairs(case: Case, reference: Series, vehicle: Vehicle, where: str) -> None:
+def check_pairs(case: Case, reference: Series, vehicle: Vehicle, where: str) -> list[str]:
     """Refuse series of one source that contradict each other: an angle its rate, a place the heading that leads there.
 
     Parameters
     ----------
     case, reference, vehicle, where : As ``check_records``.
 
+    Returns
+    -------
+    Notes on angles and rates that do not go together.
+
     Raises
     ------
     InputError
         Naming file, source and both channels, the factor between them and their correlation.
     """
-    named = limits()
+    named, said = limits(), []
     for source, channels in reference.data.items():
         scale = scales(case, vehicle, source, reference.abscissa)
         for one, other, expected in _EXPECTED:
             if one not in channels or other not in channels or (reference.abscissa == "s" and one not in _LEADS):
                 continue
             found = _regressed(channels[one], channels[other], expected(channels[other].value, scale))
-            if found is None or abs(found[1]) < named["pair_correlation"]:
+            if found is None:
+                continue
+            if abs(found[1]) < named["pair_correlation"]:
+                if one not in _LEADS:
+                    text = f"{one} and what {other} leads to do not go together (correlation {found[1]:.2f})"
+                    said.append(f"reference {source}: {text}: a part in another unit, or of the other sign?")
                 continue
             slope = found[0] / (scale.way if one in _LEADS else 1.0)
             least, most = 1.0 / named["pair_slope"], named["pair_slope"]
@@ -67,6 +76,7 @@ def check_pairs(case: Case, reference: Series, vehicle: Vehicle, where: str) -> 
             _check_side(case, reference, scale, source, where)
         if reference.abscissa == "s" and {"x", "y"} <= set(channels):
             _check_path(reference, source, where)
+    return said
 
 
 def _check_path(reference: Series, source: str, where: str) -> None:

@@ -330,7 +330,7 @@ def _held_against(
     unknown = check_reference(held.case, held.series, where)
     file = held.case.reference.file if held.case.reference and held.case.reference.file else where
     unknown += check_records(held.case, held.series, ship, file)
-    check_pairs(held.case, held.series, ship, file)
+    unknown += check_pairs(held.case, held.series, ship, file)
     if reference is not None and not held.series.smooth:
         smoothed(held.series, file)
     _check_tolerances(held.case, held.series)
