@@ -21,6 +21,8 @@ Array = NDArray[np.float64]
 _PART = 0.05
 # Points that show what is usual.
 _ENOUGH = 30
+# Of a misprint, at the least, on the line of each neighbour.
+_HALF = 0.3
 _PLAIN = {c.lower().replace("_", ""): c for c in CHANNELS}
 
 
@@ -84,15 +86,15 @@ def _far(record: Record) -> NDArray[np.bool_]:
     if len(record) < _ENOUGH:
         return bad
     share = (along[1:-1] - along[:-2]) / (along[2:] - along[:-2])
-    off = np.abs(value[1:-1] - (1.0 - share) * value[:-2] - share * value[2:])
-    usual = float(np.percentile(off, 95))
+    off = value[1:-1] - (1.0 - share) * value[:-2] - share * value[2:]
+    usual = float(np.percentile(np.abs(off), 95))
     beside = np.zeros(len(record), dtype=bool)
     # A control that stands still between its steps leaves no usual distance.
-    beside[1:-1] = (off > limits()["off_line"] * usual) & (usual > 0.0)
-    # The neighbours of a misprint are off their lines by half of it.
+    beside[1:-1] = (np.abs(off) > limits()["off_line"] * usual) & (usual > 0.0)
     step = np.diff(along)
     beside[1:-1] &= np.maximum(step[1:], step[:-1]) < limits()["gap_of_even"] * float(np.median(step))
-    beside[1:-1] &= off >= np.maximum(np.append(off[1:], 0.0), np.insert(off[:-1], 0, 0.0))
+    # A misprint puts both its neighbours off their lines by half of it, the other way; a corner does not.
+    beside[2:-2] &= (-off[:-2] * off[1:-1] > _HALF * off[1:-1] ** 2) & (-off[2:] * off[1:-1] > _HALF * off[1:-1] ** 2)
     return bad | beside
 
 
