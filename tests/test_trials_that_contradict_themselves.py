@@ -253,3 +253,18 @@ def test_speeds_ahead_and_abeam_exchanged_are_told_without_a_track(tmp_path):
     error = refusal(tmp_path, record)
     assert "going sideways" in error.found
     assert "channels exchanged, u [m/s] and v [m/s]" in error.found
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.2])
+def test_heading_and_rudder_under_one_anothers_names_are_refused_by_name(tmp_path, noise):
+    """Nothing but these two columns: a rudder does not go on turning after the heading has been put over."""
+    one = zigzag()
+    read = one["psi"] + noise * np.random.default_rng(1).standard_normal(one["psi"].size)
+    error = refusal(tmp_path, {"t [s]": one["t"], "psi [deg]": one["dH"], "delta [deg]": read})
+    assert "channels exchanged" in error.found
+    assert "psi [deg]" in error.where
+    assert "delta [deg]" in error.where
+    right = measure_trial(
+        write(tmp_path / "two.csv", {"t [s]": one["t"], "psi [deg]": read, "delta [deg]": one["dH"]}), None, COUNT
+    )
+    assert "overshoot_1_deg" in right.metrics

@@ -15,7 +15,8 @@ from ident.trials.reading import Recording
 from sim.files.record import Record
 
 _POINTS = 600
-# By how much more a heading has to go with one control than with another to be steered by it.
+# By how much more a heading has to go with one control than with another, or with its rudder than that with it, to
+# be steered by it: in records of boats and ships, 0.1 to 0.8.
 _CLOSER = 0.2
 # A heading that has turned so far has been steered before.
 _TURNED = math.radians(2.0)
@@ -25,6 +26,11 @@ def exchanged_controls(one: Recording) -> Iterator[Finding]:
     """Rudder and planes, or two angles, exchanged: the maneuver shows under another control or angle only."""
     controls = [c for c in ("dH", "dV") if c in one.channels]
     if "dH" not in controls or "psi" not in one.channels:
+        return
+    forwards = _followed(one.channels["psi"], one.channels["dH"])
+    if _followed(one.channels["dH"], one.channels["psi"]) > forwards + _CLOSER:
+        what = f"{one.headers['dH']} turns as a heading does when {one.headers['psi']} is its rudder"
+        yield pair_of(one, "psi", "dH", what)
         return
     by_rudder, turns = steered(one, "psi", "dH"), _leaves(one.channels["psi"], _TURNED)
     if by_rudder and "dV" in controls and steered(one, "psi", "dV"):
