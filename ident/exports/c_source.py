@@ -23,7 +23,7 @@ from sim.flight.plant import COMMANDS
 from sim.flight.simulate import begun, samples_of
 from sim.flight.trim import Trim
 from sim.kernel.layout import Model, workspace
-from sim.kernel.rhs import fill_rate
+from sim.kernel.rhs import BEGUN, fill_rate
 from sim.waves.in_waves import surroundings
 from sim.waves.surroundings import AT_DRIFT, AT_PARTS, CREST, DRIFT, WAVES, prepare
 
@@ -205,6 +205,7 @@ def _translated(parts: _Parts, rows: int, columns: int) -> tuple[Translation, di
     translation = Translation("boat_type")
     kinds = parts.kinds | {
         "start_zero": Number("d", 0.0),
+        "scheme": Number("i", BEGUN),
         "log": Several(
             (Block("d", (rows, columns)), Block("d", (_ROOM, 2)), Block("d", (_ROOM, 3))), maneuver.Log._fields
         ),
@@ -216,7 +217,7 @@ def _translated(parts: _Parts, rows: int, columns: int) -> tuple[Translation, di
     wanted: dict[str, tuple[Any, str]] = {
         "hold": (maneuver.hold, "flight around rate dt steps start"),
         "hold_for": (maneuver.hold_for, "flight around rate left h start"),
-        "run": (maneuver.integrate, "flight around log dt steps every start_zero"),
+        "run": (maneuver.integrate, "flight around log dt steps every scheme start_zero"),
         "fill_rate": (fill_rate, "m w y c near s k dy"),
     }
     if parts.around:
