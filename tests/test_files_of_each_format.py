@@ -298,7 +298,7 @@ def test_examples_of_the_documentation_fit_the_schema():
     """Every TOML block of docs/readers.md is a source that is accepted."""
     text = (Path(__file__).parents[1] / "docs" / "readers.md").read_text("utf-8")
     examples = [block.split("```")[0] for block in text.split("```toml\n")[1:]]
-    assert len(examples) == 18
+    assert len(examples) == 25
     for example in examples:
         data = tomllib.loads(example)["source"][0]
         history_ = data.get("rows") == "history" and "reduction" not in data

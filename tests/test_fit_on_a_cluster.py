@@ -96,10 +96,18 @@ def test_records_in_a_file_are_those_in_memory(campaign, rows, monkeypatch):
     assert isinstance(filed.channels["psi"].base, np.memmap) or isinstance(filed.channels["psi"], np.memmap)
     for channel, values in held.channels.items():
         assert np.array_equal(values, filed.channels[channel], equal_nan=True), channel
-    few = band_summary.variance_shares(held, "psi")
-    monkeypatch.setattr(band_summary, "_SQUARE", 0)
-    for one, other in zip(few, band_summary.variance_shares(held, "psi"), strict=True):
-        assert one.share == pytest.approx(other.share, rel=1e-9)
+
+
+def test_shares_over_some_instants_are_those_over_all(campaign, rows, monkeypatch):
+    case = load_case("hzz20")[0]
+    case = case.model_copy(update={"run": case.run.model_copy(update={"duration_s": 20.0})})
+    held = bands.fly_samples(case, campaign.vehicle, rows, 120, seed=2)
+    every = band_summary.variance_shares(held, "psi", most=3)
+    monkeypatch.setattr(band_summary, "_INSTANTS", 40)
+    some = {s.coefficient: s.share for s in band_summary.variance_shares(held, "psi", most=99)}
+    assert every
+    for one in every:
+        assert some[one.coefficient] == pytest.approx(one.share, abs=0.02)
 
 
 def test_hundred_thousand_samples_of_the_zigzag_fit_a_machine_of_24_GB(campaign, rows, monkeypatch):
