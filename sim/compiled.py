@@ -20,7 +20,7 @@ _OPTIONS: dict[str, Any] = {"error_model": "numpy", "nogil": True}
 _INSIDE: dict[str, Any] = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 _PACKAGE = Path(__file__).resolve().parent
 # Time to compile the right-hand side and the loop around it [s], said beforehand.
-_CALM, _WAVES = 10, 20
+_CALM, _WAVES = 20, 40
 
 
 class _Locator:
