@@ -73,7 +73,7 @@ COMMANDS = (
     (
         "validate",
         "--case",
-        "turn20-4m",
+        "hzz20",
         "--db",
         "{here}/flown",
         "--out",

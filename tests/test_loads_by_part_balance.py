@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
+from ident.cli import main
+from ident.database.store import commit
 from ident.validation.boats import Boat
 from ident.validation.loads import ADDED_MASS, INERTIA, WEIGHT, loads_by_part
 from sim.boat.coefficients import Coefficients
@@ -57,3 +60,12 @@ def test_they_balance_over_layers_and_in_a_pressed_hull(flown):
     total = table.groupby("t_s")[LOADS].sum().to_numpy()[5:-5]
     largest = table[LOADS].abs().max().to_numpy()
     assert (np.abs(total).max(axis=0) < 0.02 * largest).all()
+
+
+def test_a_boat_with_tanks_in_use_is_refused_before_anything_is_written(tmp_path, campaign, rows):
+    commit(str(tmp_path / "db"), rows, {})
+    asked = ["validate", "--case", "turn20-4m", "--loads", "part", "--history", "csv", "--db", str(tmp_path / "db")]
+    done = CliRunner().invoke(main, [*asked, "--out", str(tmp_path / "out")])
+    assert done.exit_code == 2
+    assert "ballast and trim tank" in done.output
+    assert not (tmp_path / "out").exists() or not any((tmp_path / "out").iterdir())

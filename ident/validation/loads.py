@@ -41,6 +41,12 @@ Array = NDArray[np.float64]
 WEIGHT, ADDED_MASS, INERTIA, WAVES = "weight and buoyancy", "added mass", "inertia of the boat", "waves"
 
 
+def check_parts(case: Case) -> None:
+    """Refuse a case whose loads are not all of the boat's parts. Raises ``InputError``."""
+    if uses_tanks(case):
+        raise InputError(f"case {case.name}", "ballast and trim tank in use: their weight is no part", "another case")
+
+
 def loads_by_part(case: Case, boat: Boat, flight: Simulation, by: str = "part") -> pd.DataFrame:
     """Loads of a flight over time, by part or by term.
 
@@ -66,9 +72,7 @@ def loads_by_part(case: Case, boat: Boat, flight: Simulation, by: str = "part") 
     """
     import pandas as pd
 
-    if uses_tanks(case):
-        raise InputError(f"case {case.name}", "ballast and trim tank in use: their weight is no part", "another case")
-
+    check_parts(case)
     if by not in ("part", "coefficient"):
         raise ValueError(f"by {by!r}: part or coefficient")
     record = np.ascontiguousarray(flight.record)
