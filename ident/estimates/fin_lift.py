@@ -24,7 +24,6 @@ from ident.estimates.draft import Draft, NotApplicable
 from ident.estimates.plane_loads import planes_of
 from ident.estimates.saturation import STRAIGHT, at_straight, continued_rows
 from sim.files.constants import constant
-from sim.files.errors import InputError
 
 Array = NDArray[np.float64]
 
@@ -78,10 +77,7 @@ def fin_lift(draft: Draft) -> str:
     continued = continued_rows(draft)
     if not continued.any():
         raise NotApplicable("no plane load beyond the runs (quality lift_continued)")
-    try:
-        planes = planes_of(draft)
-    except InputError as error:
-        raise NotApplicable(str(error)) from error
+    planes = planes_of(draft)
     angle, base_of = np.abs(draft.axis("delta")), at_straight(draft)
     said = []
     for fin, of in ((planes.stern_fin, draft.vehicle.stern_planes), (planes.sail_fin, draft.vehicle.forward_planes)):

@@ -54,9 +54,12 @@ def lift_slope(draft: Draft, planes: CarryOver) -> tuple[float, float, float]:
 
 
 def planes_of(draft: Draft) -> CarryOver:
-    """Carry-over of the draft's vehicle, computed once."""
+    """Carry-over of the draft's vehicle, computed once; raises ``NotApplicable`` without the geometry."""
     if "carry_over" not in draft.memo:
-        draft.memo["carry_over"] = carry_over(draft.vehicle)
+        try:
+            draft.memo["carry_over"] = carry_over(draft.vehicle)
+        except InputError as error:
+            raise NotApplicable(str(error)) from error
     planes = draft.memo["carry_over"]
     assert isinstance(planes, CarryOver)
     return planes
@@ -92,10 +95,7 @@ def carried_over(draft: Draft) -> str:
     stern = [p.name for p in draft.vehicle.stern_planes]
     if not draft.where(["Z_d*", "Y_d*"], stern).any():
         raise NotApplicable("no loads of stern planes by part")
-    try:
-        planes = planes_of(draft)
-    except InputError as error:
-        raise NotApplicable(str(error)) from error
+    planes = planes_of(draft)
     lift, wide, measured = lift_slope(draft, planes)
     force, roll = planes.force_factor, planes.roll_factor
     for terms, factor, sigma, unknown in (
@@ -118,6 +118,14 @@ def carried_over(draft: Draft) -> str:
     )
 
 
+def _sail_planes(draft: Draft) -> list[str]:
+    """Names of the sail planes; raises ``NotApplicable`` where their loads are not known by part."""
+    forward = [p.name for p in draft.vehicle.forward_planes]
+    if not draft.where(["[ZM]_d*"], forward).any():
+        raise NotApplicable("no loads of sail planes by part")
+    return forward
+
+
 def forward_planes(draft: Draft) -> str:
     """Sail planes with their roots on the sail, and what their vortices do to the stern planes.
 
@@ -126,11 +134,9 @@ def forward_planes(draft: Draft) -> str:
     NotApplicable
         Without sail planes, or without the geometry.
     """
-    forward = [p.name for p in draft.vehicle.forward_planes]
-    if not draft.where(["[ZM]_d*"], forward).any():
-        raise NotApplicable("no loads of sail planes by part")
+    forward, planes = _sail_planes(draft), planes_of(draft)
     try:
-        downwash = tail_downwash(draft.vehicle, draft.rows, planes_of(draft))
+        downwash = tail_downwash(draft.vehicle, draft.rows, planes)
     except (InputError, KeyError) as error:
         raise NotApplicable(str(error)) from error
     force, moment = float(downwash.force_factor), float(downwash.moment_factor)
@@ -155,13 +161,7 @@ def hull_below(draft: Draft) -> str:
     NotApplicable
         Without sail planes, or without the geometry.
     """
-    forward = [p.name for p in draft.vehicle.forward_planes]
-    if not draft.where(["[ZM]_d*"], forward).any():
-        raise NotApplicable("no loads of sail planes by part")
-    try:
-        planes = planes_of(draft)
-    except InputError as error:
-        raise NotApplicable(str(error)) from error
+    forward, planes = _sail_planes(draft), planes_of(draft)
     before = draft.memo.get("forward planes", (1.0, 1.0))
     assert isinstance(before, tuple)
     for term, own in zip(("Z_d*", "M_d*"), before, strict=True):

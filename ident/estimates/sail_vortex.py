@@ -188,9 +188,10 @@ def sail_vortex(draft: Draft) -> str:
     if not tails or not draft.where(["[YZ]_d*"], [p.name for p in tails]).any():
         raise NotApplicable("no loads of stern planes by part")
     try:
-        sail, factors = sail_of(draft.vehicle), planes_of(draft)
+        sail = sail_of(draft.vehicle)
     except InputError as error:
         raise NotApplicable(str(error)) from error
+    factors = planes_of(draft)
     rows, beta, length = draft.rows, draft.axis("beta"), draft.vehicle.particulars.length.value
     drift = (np.nan_to_num(beta) != 0.0) & (np.nan_to_num(draft.axis("alpha")) == 0.0)
     rolls = drift & draft.where(["K_uvw"])

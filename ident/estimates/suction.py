@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 from ident.estimates.draft import Draft, NotApplicable
 from ident.estimates.plane_loads import at_neutral, planes_of
 from ident.estimates.turning import Given
-from sim.files.errors import InputError
 
 Array = NDArray[np.float64]
 
@@ -114,10 +113,7 @@ def propeller_suction(draft: Draft, given: Given) -> str:
         raise NotApplicable("the planes were measured with the propeller at work")
     if propeller is None or not draft.where(terms, parts).any():
         raise NotApplicable("no propeller, or no loads of stern planes by part")
-    try:
-        planes = planes_of(draft)
-    except InputError as error:
-        raise NotApplicable(str(error)) from error
+    planes = planes_of(draft)
     if propeller.position is None:
         raise NotApplicable("no place of the propeller")
     loading, wake = thrust_loading(draft, propeller.diameter.value)
