@@ -11,6 +11,7 @@ import pandas as pd
 from ident.checks.findings import HULL, Evidence, Finding, Rule, check, printed_place, rows_of, together
 from ident.checks.physics import apparent_inertia, slope
 from ident.checks.potential import hull_constants
+from ident.checks.resistance import spheroid_diameter
 from sim.boat.catalogue import ACCELERATIONS, OUTPUTS
 from sim.boat.vehicle import Vehicle
 from sim.files.errors import InputError
@@ -68,7 +69,7 @@ def added_mass_over_the_spheroid(evidence: Evidence, rule: Rule) -> Iterator[Fin
     body = evidence.body
     if body is None or body.mass is None:
         return
-    diameter = math.sqrt(6.0 * body.mass / body.density / (math.pi * body.length))
+    diameter = spheroid_diameter(body)
     if diameter >= body.length:
         return
     along, across, turned = spheroid(body.length, diameter)

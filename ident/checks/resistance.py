@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 import pandas as pd
 
-from ident.checks.findings import HULL, Body, Evidence, Finding, Rule, check, kept, prime, rows_of, together
+from ident.checks.findings import HULL, Array, Body, Evidence, Finding, Rule, check, kept, prime, rows_of, together
 from sim.boat.catalogue import ACCELERATIONS
 from sim.files.constants import constant
 from sim.hull.slender import friction
@@ -27,15 +27,23 @@ def straight_ahead(runs: pd.DataFrame, widest: float = _AHEAD) -> pd.DataFrame:
     return runs[runs["test"].isin(_TESTS) & runs["part"].isin(HULL) & still & ahead & plane & moving & kept(runs, "X")]
 
 
+def spheroid_diameter(body: Body) -> float:
+    """Diameter of the prolate spheroid of the body's length and volume [m]; of bodies with a known mass."""
+    assert body.mass is not None
+    return math.sqrt(6.0 * body.mass / body.density / (math.pi * body.length))
+
+
 def wetted_surface(body: Body) -> float:
     """Surface of the prolate spheroid of the body's length and volume, about the least there is [m^2].
 
     Exact for a slender one, pi^2/4 L d; a hull with a parallel body, a sail and planes has more.
     """
-    assert body.mass is not None
-    volume = body.mass / body.density
-    diameter = math.sqrt(6.0 * volume / (math.pi * body.length))
-    return 0.25 * math.pi**2 * body.length * diameter
+    return 0.25 * math.pi**2 * body.length * spheroid_diameter(body)
+
+
+def reynolds_tested(speed: Array, body: Body, ratio: float) -> Array:
+    """Reynolds numbers over the length at the tested size, of speeds at full scale [m/s] and the scale's ratio."""
+    return speed * body.length / constant("sea_water_viscosity") / ratio**1.5
 
 
 @check("friction")
@@ -49,7 +57,7 @@ def resistance_over_friction(evidence: Evidence, rule: Rule) -> Iterator[Finding
     limits, ratio = rule.limits, campaign.header.scale.ratio
     runs = straight_ahead(evidence.runs)
     for file, group in runs.groupby(together(runs), sort=False):
-        reynolds = (group["U"] * body.length / constant("sea_water_viscosity") / ratio**1.5).to_numpy(float)
+        reynolds = reynolds_tested(group["U"].to_numpy(float), body, ratio)
         if not (reynolds > limits["reynolds"]).all():
             continue
         plate = np.array([friction(re) for re in reynolds])

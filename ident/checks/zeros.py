@@ -23,9 +23,8 @@ from ident.checks.findings import (
     rows_of,
     together,
 )
-from ident.checks.resistance import straight_ahead
+from ident.checks.resistance import reynolds_tested, straight_ahead
 from sim.boat.catalogue import ACCELERATIONS
-from sim.files.constants import constant
 from sim.hull.slender import friction
 
 # Test -> motion that alone makes the loads that symmetry forbids without it.
@@ -111,8 +110,7 @@ def constant_beside_the_square_of_the_speed(evidence: Evidence, rule: Rule) -> I
 
 def _beside_square(group: pd.DataFrame, output: str, body: Body, ratio: float, rule: Rule) -> str:
     speed, load = group["U"].to_numpy(float), group[output].to_numpy(float)
-    reynolds = speed * body.length / constant("sea_water_viscosity") / ratio**1.5
-    plate = np.array([friction(max(re, 1e3)) for re in reynolds])
+    plate = np.array([friction(max(re, 1e3)) for re in reynolds_tested(speed, body, ratio)])
     error = group[f"s_{output}"].fillna(0.0).to_numpy(float) / speed**2
     # A resistance is between the friction line and the square of the speed: a constant is one beside both.
     found = []

@@ -242,7 +242,7 @@ def _one(asked: ValidateOptions, console: Any) -> Validation:
     from ident.validation.tables import show
 
     assert asked.case is not None
-    with console.status("flying the case (the first run on a machine compiles: half a minute, in waves two)"):
+    with console.status("flying the case"):
         done = ident.validate(asked.case, asked.db, asked.version, without=asked.left_out, **asked.of_one_case())
     if asked.loads:
         from ident.validation.loads import check_parts
