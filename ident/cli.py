@@ -16,7 +16,7 @@ import click
 from ident import __version__
 from ident.commands import animate, campaigns, doctor, exports, flights, maneuvers, start, trials, versions
 from ident.commands.log import LEVELS, log_level
-from ident.commands.process import Asked, absolute_folders, ends_when_asked, ready_streams, silence
+from ident.commands.process import Asked, absolute_folders, ends_when_asked, looks_seldom, ready_streams, silence
 from ident.commands.shared import inputs_kept
 from ident.text import visible
 
@@ -28,7 +28,7 @@ class Commands(click.Group):
         """Run the program: streams that take every character, signals that end it anywhere."""
         ready_streams()
         absolute_folders()
-        with ends_when_asked():
+        with ends_when_asked(), looks_seldom():
             return super().main(*args, **kwargs)
 
     def make_context(self, *args: Any, **kwargs: Any) -> click.Context:

@@ -32,6 +32,25 @@ def test_help_imports_nothing_heavy(arguments):
     assert done.stdout.splitlines()[-1] == "loaded []"
 
 
+@pytest.mark.parametrize(("name", "ours"), [("ident", True), ("/opt/bin/ident", True), ("user_script.py", False)])
+def test_what_is_in_memory_is_looked_through_neither_during_a_command_nor_at_its_end(name, ours):
+    """It takes a tenth of a command, and a third of a second after it; a program of the user's own is left alone."""
+    program = (
+        f"import sys, gc, atexit; sys.argv = [{name!r}]\n"
+        "from ident.cli import click, main\n"
+        "before, during = gc.get_threshold(), []\n"
+        "main.add_command(click.Command('look', callback=lambda: during.extend(gc.get_threshold())))\n"
+        "main(['look'], standalone_mode=False)\n"
+        "assert gc.get_threshold() == before and during[0] >= 10 * before[0], during\n"
+        "assert not gc.get_freeze_count()\n"
+        "atexit.register(lambda: print(gc.get_freeze_count() > 0))\n"
+        "atexit._run_exitfuncs()\n"
+        "print(gc.get_freeze_count() > 0)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines() == ["False", str(ours)]
+
+
 def test_every_command_of_the_readme_is_there_with_an_example():
     text = (ROOT / "README.md").read_text("utf-8")
     named = set(re.findall(r"`ident ([a-z]+)", text))
