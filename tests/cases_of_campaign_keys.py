@@ -8,6 +8,7 @@ from declared_campaigns import DRIFT, ROWS
 
 YAW = {"pure_yaw": {"taken_off": 0.5, "sigma": 0.5, "source": "made"}}
 GRID = {"shared_error": [{"name": "grid", "relative": 0.1, "source": "made"}]}
+PRINTS = {"shared_error": [{"name": "prints", "tests": ["drift_horizontal"], "offset": {"Y": 1e-4}, "source": "made"}]}
 
 INERTIA = {
     "inertia.model_inertia_in_loads": True,
@@ -45,6 +46,7 @@ HEADER_CASES: dict[str, tuple[dict[str, Any], dict[str, Any], dict[str, Any]]] =
     "SharedError.name": (GRID, {**GRID, "shared_error.0.name": "balance"}, {"words": True}),
     "SharedError.source": (GRID, {**GRID, "shared_error.0.source": "other"}, {"words": True}),
     "SharedError.relative": (GRID, {**GRID, "shared_error.0.relative": 0.2}, {}),
+    "SharedError.offset": (PRINTS, {**PRINTS, "shared_error.0.offset": {"Y": 2e-4}}, {}),
     "SharedError.loads": (GRID, {**GRID, "shared_error.0.loads": ["Y"]}, {}),
     "SharedError.tests": (GRID, {**GRID, "shared_error.0.tests": ["towing"]}, {"said": "no run of towing"}),
     "SharedError.parts": (GRID, {**GRID, "shared_error.0.parts": ["propeller"]}, {"said": "no run of propeller"}),

@@ -10,9 +10,12 @@ from scipy.stats import norm
 from ident.estimates.cross_flow import Strips, coupling, drift_drag, integrals, literature_drag, strips, weighted_mean
 from ident.estimates.draft import Draft
 from ident.estimates.extrapolation import reach, trend_error
+from ident.estimates.facility import shared_errors
 from ident.estimates.potential import impulse_loads, product_load
 from ident.estimates.saturation import reached, saturation_angle
+from ident.estimates.turning import Given, Shared
 from sim.boat.row_codec import correlation_pairs
+from sim.files.errors import InputError
 
 
 def cylinder(half: float, width: float, n: int = 4000) -> Strips:
@@ -123,6 +126,23 @@ def test_lift_reached_is_the_expectation_of_a_saturating_line():
     for angle in (5.0, 18.0, 20.0, 30.0):
         expected = quad(lambda s, a=angle: min(a, s) * norm.pdf(s, mean, sigma), -40.0, 80.0, points=[angle])[0]
         assert reached(angle, mean, sigma) == pytest.approx(expected, rel=1e-6)
+
+
+def test_an_offset_of_all_runs_moves_loads_by_itself_and_their_sum_by_both(campaign, rows):
+    runs = frozenset(campaign.runs.loc[campaign.runs["test"] == "drift_vertical", "run_id"].astype(str))
+    offset = {"Z": 1.5e-4, "M": -4e-5}
+    given = Given(shared=(Shared("prints", None, runs, (), offset),))
+    draft = Draft.of(campaign.vehicle, rows)
+    assert shared_errors(draft, given) == "prints Z +1.5e-04 M -4.0e-05"
+    (direction,) = draft.directions.values()
+    for name, prime in offset.items():
+        of_drift = draft.where([f"{name}_uvw"]) & (draft.axis("beta") == 0.0)
+        assert of_drift.sum() == 84
+        assert set(direction[of_drift]) == {prime}
+    assert set(direction[draft.where(["X_uvw", "Y_uvw", "Z_uq", "M_d1"])]) == {0.0}
+    none = Given(shared=(Shared("prints", None, runs, (), {"Y": 1e-4}),))
+    with pytest.raises(InputError, match=r"shared_error\.offset of prints.* prime load Y"):
+        shared_errors(Draft.of(campaign.vehicle, rows), none)
 
 
 def test_shared_errors_of_a_draft_are_those_of_their_unknowns(campaign, rows):

@@ -259,6 +259,10 @@ class PureYaw(Data):
     source: str
 
 
+# Tests whose coefficients are prime loads: nothing else multiplies them.
+_STEADY = ("towing", "drift_horizontal", "drift_vertical")
+
+
 class SharedError(Data):
     """An error that all runs of some tests have in common: a grid, a normalisation, a balance.
 
@@ -268,7 +272,10 @@ class SharedError(Data):
     ----------
     name : Of the error.
     tests, parts, loads : Which loads share it; all where empty.
-    relative : Standard deviation, of the load.
+    relative : Standard deviation, of the load. This, or ``offset``.
+    offset : Load component -> prime load that may have to be added to every run, all of them together, as where two
+        prints of the same runs lie apart: F / (1/2 rho U^2 L^n), campaign frame, about the vehicle's origin. Runs
+        in drift and towing only, whose coefficients are loads themselves.
     source : Where this is said.
     """
 
@@ -276,16 +283,27 @@ class SharedError(Data):
     tests: list[str] = Field(default_factory=list)
     parts: list[str] = Field(default_factory=list)
     loads: list[str] = Field(default_factory=list)
-    relative: Annotated[float, Field(gt=0, le=1)]
+    relative: Annotated[float, Field(gt=0, le=1)] | None = None
+    offset: dict[str, float] = Field(default_factory=dict)
     source: str
 
-    @field_validator("loads")
+    @field_validator("loads", "offset")
     @classmethod
-    def _components(cls, given: list[str]) -> list[str]:
+    def _components(cls, given: list[str] | dict[str, float]) -> list[str] | dict[str, float]:
         for name in given:
             if name not in OUTPUTS:
                 raise ValueError(f"components {' '.join(OUTPUTS)}, not {name}")
         return given
+
+    @model_validator(mode="after")
+    def _one_size(self) -> SharedError:
+        if (self.relative is None) == (not self.offset):
+            raise ValueError("one of relative and offset")
+        if self.offset and (self.loads or not set(self.tests) <= set(_STEADY) or not self.tests):
+            raise ValueError(f"an offset names its loads itself, and tests of {', '.join(_STEADY)}")
+        if self.offset and not all(0.0 < abs(value) < 1.0 for value in self.offset.values()):
+            raise ValueError("an offset is a prime load between 0 and 1, or -1 and 0")
+        return self
 
 
 class CampaignFile(Data):

@@ -32,12 +32,21 @@ _NODES = 24
 
 @dataclass(frozen=True)
 class Shared:
-    """An error that runs have in common: name, relative size, runs and outputs (all of them when empty)."""
+    """An error that runs have in common.
+
+    Attributes
+    ----------
+    name : As the campaign says.
+    relative : Size, of the load; None where ``offset`` states it.
+    runs, outputs : Which share it; all of them when empty.
+    offset : Output -> prime load of one standard deviation, program frame; all of one unknown.
+    """
 
     name: str
-    relative: float
+    relative: float | None
     runs: frozenset[str]
     outputs: tuple[str, ...]
+    offset: dict[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

@@ -122,7 +122,9 @@ def given_of(campaign: Campaign) -> Given:
         if chosen.empty:
             where = f"{header.name}, key shared_error, {one.name}"
             raise InputError(where, f"no run of {' '.join(one.tests + one.parts)}", "tests and parts of the campaign")
-        shared.append(Shared(one.name, one.relative, frozenset(chosen["run_id"].astype(str)), tuple(one.loads)))
+        offset = {load: header.frame.frame.sign(load) * prime for load, prime in one.offset.items()}
+        ids = frozenset(chosen["run_id"].astype(str))
+        shared.append(Shared(one.name, one.relative, ids, tuple(one.loads), offset))
     yaw = (header.pure_yaw.taken_off, header.pure_yaw.sigma) if header.pure_yaw else None
     planes = runs[runs["test"] == "plane_deflection"]
     propelled = bool((planes["n"] > 0.0).any()) if "n" in planes else False
