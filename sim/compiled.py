@@ -17,7 +17,12 @@ from sim.compiled_cache import cache_place, is_ours
 F = TypeVar("F", bound=Callable[..., Any])
 
 _OPTIONS: dict[str, Any] = {"error_model": "numpy", "nogil": True}
-_INSIDE: dict[str, Any] = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+# Counting the references of arrays that are only handed on takes longer than the right-hand side in waves.
+_UNCOUNTED: dict[str, Any] = {"_nrt": False}
+_INSIDE: dict[str, Any] = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, **_UNCOUNTED}
+# Of an implementation that is chosen by type, and of one that becomes a part of its caller.
+CHOSEN: dict[str, Any] = {"error_model": "numpy", **_UNCOUNTED}
+CHOSEN_INLINED: dict[str, Any] = {**CHOSEN, "forceinline": True}
 _PACKAGE = Path(__file__).resolve().parent
 # Time to compile the right-hand side and the loop around it [s], said beforehand.
 _CALM, _WAVES = 20, 40
@@ -170,8 +175,13 @@ def _announce(function: Callable[..., Any], sig: Any, how_often: str) -> None:
 
 
 def outer(function: F) -> F:
-    """Compile what is called from Python, and by other compiled functions."""
-    return _kept(function)
+    """Compile what is called from Python, and by other compiled functions; it can make no array."""
+    return _kept(function, **_UNCOUNTED)
+
+
+def making(function: F) -> F:
+    """As ``outer``, for what makes arrays and therefore counts references."""
+    return _kept(function, _nrt=True)
 
 
 def inner(function: F) -> F:

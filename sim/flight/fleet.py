@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sim.boat.coefficients import Coefficients
-from sim.compiled import outer
+from sim.compiled import making
 from sim.flight import maneuver, orders
 from sim.flight.case import Case
 from sim.flight.simulate import begun, model_of, water_of
@@ -33,7 +33,7 @@ class Boats(NamedTuple):
     time: Array
 
 
-@outer
+@making
 def hold_each(
     v: maneuver.Flight, around: Around, boats: Boats, rate: Array, dt: float, steps: int, first: int, last: int
 ) -> None:

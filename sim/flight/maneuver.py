@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.boat.state import N_STATES, PSI, THETA
-from sim.compiled import inlined, inner, outer
+from sim.compiled import inlined, inner, making, outer
 from sim.flight.autopilot import clip, command_boat, move_actuators
 from sim.flight.events import advance, step_past, watch
 from sim.flight.orders import (
@@ -213,7 +213,7 @@ def _turn_over(v: Flight, axis: int, now: float, log: Log, events: int) -> int:
     return events + 1
 
 
-@outer
+@making
 def integrate(
     v: Flight, around: Around, log: Log, dt: float, steps: int, every: int, scheme: int, start: float
 ) -> tuple[int, int, int, float]:

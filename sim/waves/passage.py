@@ -23,10 +23,9 @@ WATER_RATE = IMPULSE
 
 
 @inner
-def _predict(sea: Sea, y: Array, gain: Array, matrix: Array, out: Array) -> None:
-    """State after a span when the velocities change by ``gain``, second order in its length."""
+def _predict(sea: Sea, y: Array, gain: Array, mean: Array, matrix: Array, out: Array) -> None:
+    """State after a span when the velocities change by ``gain``, second order in its length; ``mean`` is scratch."""
     h = sea.span
-    mean = np.empty(6)
     for k in range(6):
         mean[k] = y[k] + 0.5 * gain[k]
         out[k] = y[k] + gain[k]
@@ -74,18 +73,18 @@ def advance(sea: Sea, y: Array, time: float, pas: Passage) -> None:
     if pas.time[0] <= time < ahead - 1e-9 * sea.span:
         return
     known = pas.time[0] <= ahead and abs(time - ahead) <= 1e-6 * sea.span
-    gain = np.zeros(6)
-    for k in range(6):
-        gain[k] = y[k] - pas.before[k] if known else 0.0
-        pas.before[k] = y[k]
     if known and _miss(sea, y, pas) <= sea.reach:
         for i in range(pas.value.shape[1]):
             pas.value[0, i], pas.slope[0, i] = pas.value[1, i], pas.slope[1, i]
     else:
         evaluate(sea, y, time, pas, pas.value[0], pas.slope[0])
+    gain, mean = pas.body, pas.sums
+    for k in range(6):
+        gain[k] = y[k] - pas.before[k] if known else 0.0
+        pas.before[k] = y[k]
     pas.time[0] = time
     pas.time[1] = time + sea.span
-    _predict(sea, y, gain, pas.matrix, pas.state)
+    _predict(sea, y, gain, mean, pas.matrix, pas.state)
     evaluate(sea, pas.state, pas.time[1], pas, pas.value[1], pas.slope[1])
 
 

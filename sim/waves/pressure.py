@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.boat.state import PHI, PSI, THETA, X, Y, Z
-from sim.compiled import outer
+from sim.compiled import making, outer
 from sim.hull.mesh import Mesh
 from sim.waves.linear import Waves, kinematics
 
@@ -208,7 +208,7 @@ def _part_points(part: Mesh, number: float, tolerance: float) -> tuple[Array, Ar
     return np.concatenate(points), np.concatenate(volumes)
 
 
-@outer
+@making
 def froude_krylov(w: Waves, q: Quadrature, y: Array, time: float, out: Array) -> None:
     """Froude-Krylov load by the quadrature; zero, and nothing else done, without components.
 

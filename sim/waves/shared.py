@@ -11,6 +11,7 @@ from numba.extending import overload
 from numpy.typing import NDArray
 
 from sim.boat.state import N_STATES
+from sim.compiled import CHOSEN
 from sim.waves.surroundings import VALUES, WIDTH, Around
 
 Array = NDArray[np.float64]
@@ -65,11 +66,11 @@ def _calm_take_out(around: Around, kept: Array) -> None:
     pass
 
 
-@overload(put_in)
+@overload(put_in, jit_options=CHOSEN)
 def _choose_put_in(around: Around, kept: Array, phases: Array) -> object:
     return put_in if len(around) else _calm_put_in
 
 
-@overload(take_out)
+@overload(take_out, jit_options=CHOSEN)
 def _choose_take_out(around: Around, kept: Array) -> object:
     return take_out if len(around) else _calm_take_out

@@ -22,7 +22,7 @@ from numba.extending import overload
 from numpy.typing import NDArray
 
 from sim.boat.state import PHI, THETA, Z
-from sim.compiled import inner
+from sim.compiled import CHOSEN, CHOSEN_INLINED, inner
 from sim.hull.emergence import Cells, flat_cells, lose
 from sim.waves import passage as wave_passage
 from sim.waves.drift import Drift, mean_load
@@ -299,56 +299,56 @@ def _calm_wet_change(near: Around, i: int, j: int) -> float:
     return 0.0
 
 
-@overload(prepare, jit_options={"forceinline": True, "error_model": "numpy"})
+@overload(prepare, jit_options=CHOSEN_INLINED)
 def _choose_prepare(around: Around, y: Array, time: float) -> object:
     return prepare if len(around) else _calm_prepare
 
 
-@overload(read_gauge)
+@overload(read_gauge, jit_options=CHOSEN)
 def _choose_read_gauge(around: Around, state: Array, rate: Array) -> object:
     return read_gauge if len(around) else _calm_read_gauge
 
 
-@overload(near_of)
+@overload(near_of, inline="always")
 def _choose_near(around: Around) -> object:
     return _near if len(around) else _calm_near
 
 
-@overload(tick)
+@overload(tick, jit_options=CHOSEN)
 def _choose_tick(near: Around, offset: float) -> object:
     return tick if len(near) else _calm_tick
 
 
-@overload(observe, jit_options={"forceinline": True, "error_model": "numpy"})
+@overload(observe, jit_options=CHOSEN_INLINED)
 def _choose_observe(near: Around, y: Array) -> object:
     return observe if len(near) else _calm_observe
 
 
-@overload(relative)
+@overload(relative, inline="always")
 def _choose_relative(near: Around, y: Array) -> object:
     return relative if len(near) else _calm_relative
 
 
-@overload(plane_inflow)
+@overload(plane_inflow, jit_options=CHOSEN)
 def _choose_plane_inflow(near: Around, plane: int) -> object:
     return plane_inflow if len(near) else _calm_plane_inflow
 
 
-@overload(propeller_inflow)
+@overload(propeller_inflow, jit_options=CHOSEN)
 def _choose_propeller_inflow(near: Around, planes: int) -> object:
     return propeller_inflow if len(near) else _calm_propeller_inflow
 
 
-@overload(add_loads, jit_options={"forceinline": True, "error_model": "numpy"})
+@overload(add_loads, jit_options=CHOSEN_INLINED)
 def _choose_add_loads(near: Around, y: Array, out: Array) -> object:
     return add_loads if len(near) else _calm_add_loads
 
 
-@overload(is_emerged)
+@overload(is_emerged, jit_options=CHOSEN)
 def _choose_is_emerged(near: Around) -> object:
     return is_emerged if len(near) else _calm_is_emerged
 
 
-@overload(wet_change)
+@overload(wet_change, jit_options=CHOSEN)
 def _choose_wet_change(near: Around, i: int, j: int) -> object:
     return wet_change if len(near) else _calm_wet_change
