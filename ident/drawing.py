@@ -10,10 +10,7 @@ import functools
 import importlib
 import logging
 import multiprocessing
-import os
-import signal
 import sys
-import threading
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor
@@ -22,6 +19,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, TypeVar, cast
 
+from ident.processes import cores, serves, unheard
 from sim.files import inputs
 
 if TYPE_CHECKING:
@@ -33,9 +31,6 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 _log = logging.getLogger(__name__)
-# What ends a command: see ident.commands.process.
-_ASKS = (signal.SIGINT, signal.SIGTERM)
-
 # Figures for which another process is worth its start.
 _WORTH = 4
 
@@ -127,26 +122,11 @@ def place_panels(figure: Figure, rows: int, columns: int, margins: Margins | Non
     )
 
 
-def cores() -> int:
-    """Cores that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
-def _end_with_parent() -> None:
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-        parent.join()
-        os._exit(1)
-
-
 def _ready(read: Iterable[Path] | None) -> None:
     """A process that draws: what the command has read it does not write over; it ends when the command does."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    threading.Thread(target=_end_with_parent, daemon=True).start()
     if read is not None:
         inputs.begin(read)
-    if hasattr(signal, "pthread_sigmask"):
-        signal.pthread_sigmask(signal.SIG_UNBLOCK, _ASKS)
+    serves()
 
 
 @contextlib.contextmanager
@@ -161,19 +141,6 @@ def _without_a_word() -> Iterator[None]:
         yield
     finally:
         sys.warnoptions.remove(flag)
-
-
-@contextlib.contextmanager
-def _unheard() -> Iterator[None]:
-    """Signals wait: a process that is started meanwhile meets none before it is ready for it."""
-    if not hasattr(signal, "pthread_sigmask"):
-        yield
-        return
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, _ASKS)
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _here(draw: Callable[..., T], *job: Any) -> T:
@@ -217,7 +184,7 @@ def ahead(*modules: str) -> Iterator[Callable[..., Any]]:
     context = multiprocessing.get_context("spawn")
     end, others = context.Pipe()
     process = context.Process(target=_draw_what_comes, args=(others, modules), daemon=True)
-    with _unheard():
+    with unheard():
         process.start()
     others.close()
 
@@ -307,7 +274,7 @@ def begun(draw: Callable[..., T], jobs: Sequence[tuple[Any, ...]], workers: int 
         return [shared.drawn[k] for k in range(len(jobs))]
 
     try:
-        with _unheard():
+        with unheard():
             for _ in range(others):
                 shared.give(pool)
         yield finish

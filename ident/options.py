@@ -21,7 +21,8 @@ class Work:
     tell : Called with what is done, how much of it is, and of how much (0 where that is not known).
     dask : Of ``fit``: address of a Dask scheduler whose workers, which see the same folders, read the files,
         reduce their histories and solve the blocks of unknowns.
-    workers : Of ``calibrate``: threads; all cores when None.
+    workers : Of ``calibrate``: threads; all cores when None. Of ``fit``: processes, of which a second one
+        estimates while the first one checks the runs; one when None, and 0 for one a core.
 
     Examples
     --------

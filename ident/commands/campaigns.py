@@ -107,7 +107,7 @@ def fit(**options: Any) -> None:
             asked.force,
             measured_only=asked.measured_only,
             without=asked.without,
-            work=ident.Work(asked.wait, tell, asked.dask),
+            work=ident.Work(asked.wait, tell, asked.dask, workers=0),
         )
     for one in done:
         show(one, console)

@@ -8,6 +8,7 @@ import math
 import os
 from collections.abc import Collection
 from dataclasses import asdict, astuple, dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -27,6 +28,7 @@ from ident.fitting.summary import summary
 from ident.identification.identify import Identification, identify
 from ident.options import Work
 from ident.output import Results, html_table
+from ident.processes import meanwhile
 from ident.text import on_screen
 from sim.files.errors import InputError
 
@@ -256,15 +258,16 @@ def _ready(
     folder: Path, force: str, measured_only: bool, without: Collection[str], work: Work
 ) -> list[tuple[Identification, list[Finding], pd.DataFrame, list[Estimated]]]:
     """Every campaign identified and checked, its rows, and what became of each estimate."""
-    if work.workers is not None:
-        raise InputError("fit, work.workers", f"{work.workers}", "dask: threads are of calibrate")
-    checked = _checked(folder, force, work)
-    ready = [(one, findings, *_rows(one, measured_only, without)) for one, findings in checked]
-    for one, _, rows, _ in ready:
-        if rows.empty:
+    paths, identified = _identified(folder, work)
+    # Beside the checks where the work may have two processes: they take as long.
+    with meanwhile(partial(_every_rows, identified, measured_only, without), work.workers) as rows_of_each:
+        checked = _checked(paths, identified, force, work)
+        rows = rows_of_each()
+    for one, (table, _) in zip(identified, rows, strict=True):
+        if table.empty:
             nothing = "no run, and no estimate that works without"
             raise InputError(one.campaign.header.name, nothing, "runs, or a vehicle whose geometry file has a hull")
-    return ready
+    return [(one, findings, *given) for one, findings, given in zip(identified, checked, rows, strict=True)]
 
 
 def _log_fit(done: Fit) -> None:
@@ -273,13 +276,17 @@ def _log_fit(done: Fit) -> None:
     _log.info("campaign fitted", extra=said)
 
 
-def _checked(folder: Path, force: str, work: Work) -> list[tuple[Identification, list[Finding]]]:
-    """Every campaign read, identified and checked; an error that a check finds is refused without a reason."""
+def _identified(folder: Path, work: Work) -> tuple[list[Path], list[Identification]]:
+    """Every campaign read and identified, and where it lies."""
     paths = find_campaigns(folder)
     with cluster(work.dask) as spread:
         read, paths = by_vehicle([read_campaign(path, tell=work.tell, spread=spread) for path in paths], paths)
-        identified = [identify(campaign, work.tell, spread) for campaign in read]
-    checked = [check_campaign(*one, work.tell) for one in zip(read, paths, identified, strict=True)]
+        return paths, [identify(campaign, work.tell, spread) for campaign in read]
+
+
+def _checked(paths: list[Path], identified: list[Identification], force: str, work: Work) -> list[list[Finding]]:
+    """What the checks find in every campaign; an error is refused without a reason."""
+    checked = [check_campaign(one.campaign, path, one, work.tell) for path, one in zip(paths, identified, strict=True)]
     for one, findings in zip(identified, checked, strict=True):
         _log_checks(one.campaign, findings)
     if not force.strip():
@@ -287,7 +294,14 @@ def _checked(folder: Path, force: str, work: Work) -> list[tuple[Identification,
             refuse_errors(path, findings)
     elif not any(f.severity == "error" for findings in checked for f in findings):
         raise InputError("--force", repr(force[:60]), "nothing: no check finds an error")
-    return list(zip(identified, checked, strict=True))
+    return checked
+
+
+def _every_rows(
+    identified: list[Identification], measured_only: bool, without: Collection[str]
+) -> list[tuple[pd.DataFrame, list[Estimated]]]:
+    """Database rows of every campaign, and what became of each estimate."""
+    return [_rows(one, measured_only, without) for one in identified]
 
 
 def _rows(one: Identification, measured_only: bool, without: Collection[str]) -> tuple[pd.DataFrame, list[Estimated]]:
