@@ -157,6 +157,7 @@ def c_source(boat: Boat, case: Case, db: str) -> Source:
         "s": members.add(work.real, "scratch"),
         "k": members.add(work.whole, "cells"),
         "stage": members.add(work.stage, "stage"),
+        "sample": members.add(maneuver.sample_of(controls.size), "sample"),
         "rate": members.add(np.zeros(controls.size), "actuator_rate"),
         "around": _around(members, around),
         "y": Block("d", (12,), "boat->state"),

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sim.boat.state import PHI, THETA, Z
-from sim.compiled import inner, outer
+from sim.compiled import inner, merged, outer
 from sim.kernel.layout import DIAMETER, HAS_TANKS, HELD, N_PLANES, SHIFT, Array, Whole
 from sim.kernel.rhs import fill_rate
 
@@ -95,7 +95,7 @@ def hold(b: Search, x: np.ndarray) -> None:
         b.dy[4] = x[2]
 
 
-@inner
+@merged
 def _solve(a: np.ndarray) -> bool:
     """Six equations with their right side as a column, solved into it; false when singular."""
     n = N_X + 1
@@ -131,7 +131,7 @@ def _try(b: Search, x: np.ndarray) -> float:
     return total
 
 
-@inner
+@merged
 def _slopes(b: Search, x: np.ndarray) -> None:
     """The linear system of Newton's method at the unknowns, whose residuals are in the scratch."""
     a = b.a
@@ -149,7 +149,7 @@ def _slopes(b: Search, x: np.ndarray) -> None:
         a[_X + i] = x[i]
 
 
-@inner
+@merged
 def _step_down(b: Search, x: np.ndarray, norm: float) -> bool:
     """Go along the solution of the system, halved until the residuals fall; false when they do not."""
     a, share = b.a, 1.0

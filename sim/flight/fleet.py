@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sim.boat.coefficients import Coefficients
-from sim.compiled import making
+from sim.compiled import outer
 from sim.flight import maneuver, orders
 from sim.flight.case import Case
 from sim.flight.simulate import begun, model_of, water_of
@@ -33,7 +33,7 @@ class Boats(NamedTuple):
     time: Array
 
 
-@making
+@outer
 def hold_each(
     v: maneuver.Flight, around: Around, boats: Boats, rate: Array, dt: float, steps: int, first: int, last: int
 ) -> None:
@@ -45,10 +45,10 @@ def hold_each(
     boats : One whose state has left the finite numbers is left alone.
     """
     for i in range(first, last):
-        if not np.isfinite(boats.y[i]).all():
+        if not maneuver.is_finite(boats.y[i]):
             continue
         put_in(around, boats.kept[i], boats.phases[i])
-        one = maneuver.Flight(v.m, v.w, v.g, v.q, boats.f[i], v.j, boats.y[i], boats.c[i], v.s, v.k, v.stage)
+        one = maneuver.Flight(v.m, v.w, v.g, v.q, boats.f[i], v.j, boats.y[i], boats.c[i], v.s, v.k, v.stage, v.sample)
         boats.time[i] = maneuver.hold(one, around, rate, dt, steps, boats.time[i])
         take_out(around, boats.kept[i])
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.boat.state import N_STATES, PSI, THETA
-from sim.compiled import inlined, inner, making, outer
+from sim.compiled import inlined, merged, outer
 from sim.flight.autopilot import clip, command_boat, move_actuators
 from sim.flight.events import advance, step_past, watch
 from sim.flight.orders import (
@@ -55,6 +55,24 @@ _EVENTS = 256
 _EVENT_TOLERANCE = 1e-10
 
 
+class Sample(NamedTuple):
+    """Scratch of a control sample.
+
+    read, change : (12,) state and its rate as the autopilot reads them. trial : (12,) state a step further.
+    rate : (controls,) at which the actuators move.
+    """
+
+    read: Array
+    change: Array
+    trial: Array
+    rate: Array
+
+
+def sample_of(controls: int) -> Sample:
+    """Scratch for so many controls."""
+    return Sample(*np.zeros((3, N_STATES)), np.zeros(controls))
+
+
 class Flight(NamedTuple):
     """A boat under way, as the compiled loop takes it.
 
@@ -62,7 +80,7 @@ class Flight(NamedTuple):
     ----------
     m, w : Model. g, q : Settings. f, j : Progress. s, k : Scratch. Floats and whole numbers.
     y, c : (12,) state and controls.
-    stage : Scratch of a step.
+    stage : Scratch of a step. sample : Scratch of a control sample.
     """
 
     m: Array
@@ -76,6 +94,7 @@ class Flight(NamedTuple):
     s: Array
     k: Whole
     stage: Stage
+    sample: Sample
 
 
 class Log(NamedTuple):
@@ -102,10 +121,10 @@ def flight_of(model: Model, settings: Settings, work: Work, y: Array, c: Array) 
     """
     g, q = flat(settings)
     f, j = progress(settings, y)
-    return Flight(model.real, model.whole, g, q, f, j, y, c, work.real, work.whole, work.stage)
+    return Flight(model.real, model.whole, g, q, f, j, y, c, work.real, work.whole, work.stage, sample_of(c.size))
 
 
-@inlined
+@merged
 def _past_check(g: np.ndarray, q: np.ndarray, y: np.ndarray, sense: float) -> float:
     """Positive once the checked angle has passed the check value of the present leg."""
     if q[LAW + HORIZONTAL] == ZIGZAG:
@@ -125,7 +144,7 @@ def _past(g: np.ndarray, q: np.ndarray, f: np.ndarray, j: np.ndarray, y: np.ndar
     return latest
 
 
-@inner
+@merged
 def _cross(v: Flight, near: Around, rate: np.ndarray, t: float, h: float, scheme: int, trial: np.ndarray) -> float:
     """Time into the step from ``t`` at which the first event happens; the state then into ``trial``."""
     low, high = 0.0, h
@@ -141,7 +160,7 @@ def _cross(v: Flight, near: Around, rate: np.ndarray, t: float, h: float, scheme
             low = middle
 
 
-@inner
+@merged
 def _next_steps(
     g: np.ndarray, q: np.ndarray, f: np.ndarray, j: np.ndarray, y: np.ndarray, t: float, log: np.ndarray, logged: int
 ) -> tuple[int, bool]:
@@ -166,15 +185,16 @@ def _next_steps(
     return logged, ends
 
 
-@inlined
-def _is_finite(y: np.ndarray) -> bool:
+@merged
+def is_finite(y: np.ndarray) -> bool:
+    """Whether all of a state is finite."""
     total = 0.0
     for i in range(N_STATES):
         total += 0.0 * y[i]
     return total == 0.0
 
 
-@inlined
+@merged
 def _note(f: np.ndarray, y: np.ndarray, c: np.ndarray, time: float, record: np.ndarray, row: int) -> None:
     """Put time, state, controls and the two plane commands into a row of the record."""
     record[row, TIME] = time
@@ -186,10 +206,10 @@ def _note(f: np.ndarray, y: np.ndarray, c: np.ndarray, time: float, record: np.n
         record[row, CONTROLS + c.size + i] = f[COMMAND + i]
 
 
-@inlined
-def _command(v: Flight, around: Around, now: float, dt: float, read: np.ndarray, change: np.ndarray) -> None:
+@merged
+def _command(v: Flight, around: Around, now: float, dt: float) -> None:
     """Commands of the sample that begins now; the rate of the state into the start of the next step."""
-    dy = v.stage.start
+    dy, read, change = v.stage.start, v.sample.read, v.sample.change
     prepare(around, v.y, now)
     fill_rate(v.m, v.w, v.y, v.c, near_of(around), v.s, v.k, dy)
     if v.q[N_EVENTS] > 0:
@@ -201,7 +221,7 @@ def _command(v: Flight, around: Around, now: float, dt: float, read: np.ndarray,
     command_boat(v.g, v.q, v.f, v.j, read, change, dt)
 
 
-@inlined
+@merged
 def _turn_over(v: Flight, axis: int, now: float, log: Log, events: int) -> int:
     """Reverse a zigzag, when it is at its check angle; executes so far."""
     if _past_check(v.g, v.q, v.y, v.f[SENSE]) < 0.0:
@@ -213,7 +233,7 @@ def _turn_over(v: Flight, axis: int, now: float, log: Log, events: int) -> int:
     return events + 1
 
 
-@making
+@outer
 def integrate(
     v: Flight, around: Around, log: Log, dt: float, steps: int, every: int, scheme: int, start: float
 ) -> tuple[int, int, int, float]:
@@ -233,8 +253,7 @@ def integrate(
     -------
     (rows recorded, executes, steps that ended, time at the end [s]); there may be more than the log has room for.
     """
-    trial, read, change = np.empty(N_STATES), np.empty(N_STATES), np.empty(N_STATES)
-    rate, near = np.empty(v.c.size), near_of(around)
+    trial, rate, near = v.sample.trial, v.sample.rate, near_of(around)
     rows, events, ended, ends = 0, 0, 0, False
     programmed = v.q[N_EVENTS] > 0
     zigzag = v.q[LAW] == ZIGZAG or v.q[LAW + 1] == ZIGZAG
@@ -243,11 +262,11 @@ def integrate(
         log.executes[0, 0], log.executes[0, 1], events = start, v.g[VALUE + axis], 1
     for sample in range(steps + 1):
         now = start + sample * dt
-        _command(v, around, now, dt, read, change)
+        _command(v, around, now, dt)
         if sample % every == 0 and rows < log.record.shape[0]:
             _note(v.f, v.y, v.c, now, log.record, rows)
             rows += 1
-        if sample == steps or not _is_finite(v.y):
+        if sample == steps or not is_finite(v.y):
             return rows, events, ended, now
         move_actuators(v.g, v.q, v.f, v.c, dt, rate)
         left = dt
@@ -296,7 +315,7 @@ def hold_for(v: Flight, around: Around, rate: np.ndarray, left: float, h: float,
     step(v.m, v.w, v.y, v.c, rate, h, near_of(around), v.s, v.k, v.stage, FROM_STATE, v.y)
     for i in range(v.c.size):
         v.c[i] += h * rate[i]
-    return _is_finite(v.y)
+    return is_finite(v.y)
 
 
 @outer

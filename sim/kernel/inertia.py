@@ -11,7 +11,7 @@ from math import cos, sin
 import numpy as np
 
 from sim.boat.state import PHI, THETA
-from sim.compiled import inlined, inner
+from sim.compiled import inner, merged
 from sim.kernel.layout import (
     HAS_TANKS,
     INVERSE_MASS,
@@ -56,7 +56,7 @@ def add_tank_loads(m: np.ndarray, w: np.ndarray, y: np.ndarray, c: np.ndarray, s
     s[LOADS + 5] += sx * ay - sy * ax - turn * (p * yy - q * x)
 
 
-@inner
+@merged
 def _fill_tanks(m: np.ndarray, dm: float, shift: float, s: np.ndarray) -> None:
     """Add what the tanks change to the mass matrix in the scratch."""
     x, y, z = m[TANK], m[TANK + 1], m[TANK + 2]
@@ -75,7 +75,7 @@ def _fill_tanks(m: np.ndarray, dm: float, shift: float, s: np.ndarray) -> None:
     s[SYSTEM + 8 * 5] += dm * (x * x + y * y)
 
 
-@inner
+@merged
 def _solve(s: np.ndarray, dy: np.ndarray) -> None:
     """Accelerations from the mass matrix in the scratch, six loads beside it, into ``dy``.
 
@@ -93,7 +93,7 @@ def _solve(s: np.ndarray, dy: np.ndarray) -> None:
         dy[k] = left / s[SYSTEM + 8 * k]
 
 
-@inlined
+@merged
 def accelerate(
     m: np.ndarray, w: np.ndarray, c: np.ndarray, loads: Loads, near: Around, s: np.ndarray, dy: np.ndarray
 ) -> None:

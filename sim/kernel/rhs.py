@@ -16,7 +16,7 @@ import numpy as np
 
 from sim.boat.catalogue import BOAT_FEATURES, STILL
 from sim.boat.state import N_STATES, PHI, PSI, THETA, X, Y, Z
-from sim.compiled import inlined, outer
+from sim.compiled import inlined, merged, outer
 from sim.kernel.inertia import accelerate, add_tank_loads
 from sim.kernel.layout import (
     BUOYANCY,
@@ -74,7 +74,7 @@ def _arcsine(x: float) -> float:
     return asin(min(1.0, max(-1.0, x)))
 
 
-@inlined
+@merged
 def _fill_boat(m: np.ndarray, y: np.ndarray, at: int, ahead: float, n: float, s: np.ndarray) -> None:
     """Features of the boat as a whole, in the order of the catalogue, into the scratch.
 
@@ -104,7 +104,7 @@ def _fill_boat(m: np.ndarray, y: np.ndarray, at: int, ahead: float, n: float, s:
     s[_PITCH_PIVOT] = w_ / q if abs(q) > STILL else 0.0
 
 
-@inlined
+@merged
 def _fill_planes(m: np.ndarray, w: np.ndarray, y: np.ndarray, c: np.ndarray, near: Around, s: np.ndarray) -> None:
     """Speed, effective angle and deflection of every plane from its velocity through the water."""
     u, v, w_, p, q, r = y[0], y[1], y[2], y[3], y[4], y[5]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sim.compiled import inlined, inner
+from sim.compiled import inlined, inner, merged
 from sim.kernel.layout import (
     AT_AXES,
     AT_FRACTIONS,
@@ -45,7 +45,7 @@ def _search(m: np.ndarray, w: np.ndarray, axis: int, x: float, k: np.ndarray, pl
     return m[at + 4] + (x - m[at + 2]) * m[at + 3]
 
 
-@inlined
+@merged
 def _locate(m: np.ndarray, w: np.ndarray, s: np.ndarray, k: np.ndarray) -> None:
     """Fraction along every axis, into the scratch: quickly in the cell of the last call."""
     axis, fraction = w[AT_AXES], w[AT_FRACTIONS]
@@ -58,7 +58,7 @@ def _locate(m: np.ndarray, w: np.ndarray, s: np.ndarray, k: np.ndarray) -> None:
         axis += AXIS
 
 
-@inlined
+@merged
 def _multiply(w: np.ndarray, s: np.ndarray) -> None:
     """Products of the features that stand beside the coefficients, into the scratch."""
     at, product = w[AT_MULTIPLIERS], w[AT_PRODUCTS]
@@ -70,7 +70,7 @@ def _multiply(w: np.ndarray, s: np.ndarray) -> None:
         at += 4
 
 
-@inlined
+@merged
 def add_up_loads(m: np.ndarray, w: np.ndarray, s: np.ndarray, k: np.ndarray) -> None:
     """Hydrodynamic loads X Y Z K M N of the features in the scratch, into the scratch.
 
