@@ -21,8 +21,8 @@ _OPTIONS: dict[str, Any] = {"error_model": "numpy", "nogil": True, "no_cfunc_wra
 _UNCOUNTED: dict[str, Any] = {"_nrt": False}
 _INSIDE: dict[str, Any] = {"no_cpython_wrapper": True, **_UNCOUNTED}
 # Of an implementation that is chosen by type, and of one that becomes a part of its caller.
-CHOSEN: dict[str, Any] = {**_OPTIONS, **_INSIDE}
-CHOSEN_INLINED: dict[str, Any] = {**CHOSEN, "forceinline": True}
+CHOSEN: Any = {**_OPTIONS, **_INSIDE}
+CHOSEN_INLINED: Any = {**CHOSEN, "forceinline": True}
 _PACKAGE = Path(__file__).resolve().parent
 # Time to compile the right-hand side and the loop around it [s], said beforehand.
 _CALM, _WAVES = 20, 40

@@ -161,11 +161,11 @@ def _rate(
         s[LOADS + i] += s[OUTSIDE + i]
     if w[HAS_TANKS]:
         add_tank_loads(m, w, y, c, s)
-    add_loads(near, y, s)
     u, v, w_, p, q, r = y[0], y[1], y[2], y[3], y[4], y[5]
     phi, theta, psi = y[PHI], y[THETA], y[PSI]
     sf, cf, st, ct, sp, cp = sin(phi), cos(phi), sin(theta), cos(theta), sin(psi), cos(psi)
     gx, gy, gz = -st, ct * sf, ct * cf
+    add_loads(near, y, (gx, gy, gz), s)
     mass, weight = m[MASS], m[WEIGHT]
     xg, yg, zg = m[R_G], m[R_G + 1] + s[SHIFT], m[R_G + 2]
     xb, yb, zb = m[R_B], m[R_B + 1], m[R_B + 2]

@@ -18,8 +18,8 @@ from sim.waves.pressure import fill_rotation
 
 Array = NDArray[np.float64]
 
-# What ``interpolate`` puts in the place of IMPULSE.
-WATER_RATE = IMPULSE
+# Numbers of a curve over a span: its present value and four coefficients.
+CURVE = 5
 
 
 @inner
@@ -60,7 +60,7 @@ def _miss(sea: Sea, y: Array, pas: Passage) -> float:
 
 
 @outer
-def advance(sea: Sea, y: Array, time: float, pas: Passage) -> None:
+def advance(sea: Sea, y: Array, time: float, pas: Passage) -> bool:
     """Make the sums cover the time from now on; call it before a step, not within one.
 
     Parameters
@@ -68,16 +68,21 @@ def advance(sea: Sea, y: Array, time: float, pas: Passage) -> None:
     sea, pas : Of this boat and thread.
     y : (12,) state now.
     time : Now [s].
+
+    Returns
+    -------
+    Whether the sums at the start are new, and not those that ended the span before.
     """
     ahead = pas.time[1]
     if pas.time[0] <= time < ahead - 1e-9 * sea.span:
-        return
+        return False
     known = pas.time[0] <= ahead and abs(time - ahead) <= 1e-6 * sea.span
-    if known and _miss(sea, y, pas) <= sea.reach:
+    anew = not (known and _miss(sea, y, pas) <= sea.reach)
+    if anew:
+        evaluate(sea, y, time, pas, pas.value[0], pas.slope[0])
+    else:
         for i in range(pas.value.shape[1]):
             pas.value[0, i], pas.slope[0, i] = pas.value[1, i], pas.slope[1, i]
-    else:
-        evaluate(sea, y, time, pas, pas.value[0], pas.slope[0])
     gain, mean = pas.body, pas.sums
     for k in range(6):
         gain[k] = y[k] - pas.before[k] if known else 0.0
@@ -86,54 +91,53 @@ def advance(sea: Sea, y: Array, time: float, pas: Passage) -> None:
     pas.time[1] = time + sea.span
     _predict(sea, y, gain, mean, pas.matrix, pas.state)
     evaluate(sea, pas.state, pas.time[1], pas, pas.value[1], pas.slope[1])
+    return anew
 
 
-@inlined
-def _hermite(start: float, end: float, time: float) -> tuple[float, float, float, float, float, float, float]:
-    """Weights of a cubic between two sums: of the values and slopes at its ends, in the value
-    (four) and in its rate (of the difference of the values, and of the slopes)."""
-    h = end - start
-    t = (time - start) / h
-    a, b = (1.0 + 2.0 * t) * (1.0 - t) * (1.0 - t), t * t * (3.0 - 2.0 * t)
-    c, d = h * t * (1.0 - t) * (1.0 - t), h * t * t * (t - 1.0)
-    e, f, g = 6.0 * t * (1.0 - t) / h, (1.0 - t) * (1.0 - 3.0 * t), t * (3.0 * t - 2.0)
-    return a, b, c, d, e, f, g
-
-
-@inlined
-def blend(
-    v: Array,
-    start: float,
-    end: float,
-    value: int,
-    slope: int,
-    width: int,
-    time: float,
-    first: int,
-    last: int,
-    out: Array,
-    at: int,
-) -> None:
-    """Wave quantities ``first`` to ``last`` at a time, into ``out`` from ``at + first`` on.
+@inner
+def fit(value: Array, slope: Array, span: float, out: Array, at: int) -> None:
+    """Curves of all quantities over a span: cubic Hermite polynomials of the part of it that has passed.
 
     Parameters
     ----------
-    v : Holds values and slopes at both ends of the span, ``width`` each, from ``value`` and ``slope`` on.
-    start, end, time : Of the span, and wanted [s].
+    value, slope : (2, n) at its ends. span : Its length [s].
+    out : From ``at`` on ``CURVE`` numbers a quantity: its present value, left alone, and coefficients of t^0 to t^3.
     """
-    a, b, c, d, e, f, g = _hermite(start, end, time)
-    after, turned = value + width, slope + width
-    for i in range(first, last):
-        out[at + i] = a * v[value + i] + b * v[after + i] + c * v[slope + i] + d * v[turned + i]
-    if first == 0:
-        for i in range(WATER, WATER + 6):
-            rate = e * (v[after + i] - v[value + i]) + f * v[slope + i] + g * v[turned + i]
-            out[at + WATER_RATE - WATER + i] = rate
+    for i in range(value.shape[1]):
+        k, rise = at + CURVE * i, value[1, i] - value[0, i]
+        start, end = span * slope[0, i], span * slope[1, i]
+        out[k + 1], out[k + 2] = value[0, i], start
+        out[k + 3], out[k + 4] = 3.0 * rise - 2.0 * start - end, start + end - 2.0 * rise
+
+
+@inner
+def recall(curves: Array, at: int, span: float, value: Array, slope: Array) -> None:
+    """Values and slopes at the end of curves, into the second rows of (2, n) arrays."""
+    for i in range(value.shape[1]):
+        k = at + CURVE * i
+        a, b, c = curves[k + 2], curves[k + 3], curves[k + 4]
+        value[1, i], slope[1, i] = curves[k + 1] + a + b + c, (a + 2.0 * b + 3.0 * c) / span
+
+
+@inlined
+def height(curves: Array, k: int, t: float) -> float:
+    """Value of the curve that stands at ``k``, when the part ``t`` of its span has passed."""
+    return curves[k + 1] + t * (curves[k + 2] + t * (curves[k + 3] + t * curves[k + 4]))
+
+
+@inlined
+def rise(curves: Array, k: int, t: float) -> float:
+    """Slope of a curve, over the whole of its span."""
+    return curves[k + 2] + t * (2.0 * curves[k + 3] + 3.0 * t * curves[k + 4])
 
 
 @outer
-def _interpolate(start: float, end: float, v: Array, width: int, time: float, out: Array) -> None:
-    blend(v, start, end, 0, 2 * width, width, time, 0, width, out, 0)
+def _interpolate(value: Array, slope: Array, span: float, t: float, curves: Array, out: Array) -> None:
+    fit(value, slope, span, curves, 0)
+    for i in range(value.shape[1]):
+        out[i] = height(curves, CURVE * i, t)
+    for i in range(6):
+        out[IMPULSE + i] = rise(curves, CURVE * (WATER + i), t) / span
 
 
 def interpolate(span: Array, value: Array, slope: Array, time: float, out: Array) -> None:
@@ -143,28 +147,9 @@ def interpolate(span: Array, value: Array, slope: Array, time: float, out: Array
     ----------
     span, value, slope : ``time``, ``value`` and ``slope`` of a passage, after ``advance``.
     time : [s].
-    out : (n,) FORCE Froude-Krylov load [N, N m]; WATER_RATE rate of the water's u v w p q r
+    out : (n,) FORCE Froude-Krylov load [N, N m]; in the place of IMPULSE the rate of the water's u v w p q r
         along the motion [m/s^2, rad/s^2], which times the added mass is the added-mass load;
         WATER; PROBES; gauge; elevations.
     """
-    v = np.concatenate([value.ravel(), slope.ravel()])
-    _interpolate(span[0], span[1], v, value.shape[1], time, out)
-
-
-@outer
-def gauge(sea: Sea, pas: Passage, time: float) -> tuple[float, float]:
-    """Head of the waves' pressure at the body origin and its rate along the motion.
-
-    Parameters
-    ----------
-    sea, pas : After ``advance``.
-    time : [s].
-
-    Returns
-    -------
-    p / (rho g) [m] and its rate [m/s]: what a depth gauge reads beside the depth.
-    """
-    i = pas.value.shape[1] - sea.stations - 1
-    p, q, r, s = pas.value[0, i], pas.value[1, i], pas.slope[0, i], pas.slope[1, i]
-    a, b, c, d, e, f, g = _hermite(pas.time[0], pas.time[1], time)
-    return a * p + b * q + c * r + d * s, e * (q - p) + f * r + g * s
+    whole = span[1] - span[0]
+    _interpolate(value, slope, whole, (time - span[0]) / whole, np.zeros(CURVE * value.shape[1]), out)

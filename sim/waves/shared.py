@@ -12,12 +12,11 @@ from numpy.typing import NDArray
 
 from sim.boat.state import N_STATES
 from sim.compiled import CHOSEN
-from sim.waves.surroundings import VALUES, WIDTH, Around
+from sim.waves.passage import CURVE
+from sim.waves.surroundings import CURVES, WIDTH, Around
 
 Array = NDArray[np.float64]
 
-# Quantities now, then values and slopes before and after, stand one behind the other.
-_SETS = 5
 # Of a passage, beside the predicted state: velocities before.
 _BEFORE = 6
 
@@ -26,7 +25,7 @@ def kept_size(around: Around) -> int:
     """How many numbers a boat keeps of its surroundings; none in deep, calm water."""
     if not len(around):
         return 0
-    return VALUES + _SETS * int(around.near.b[WIDTH]) + N_STATES + _BEFORE
+    return CURVES + CURVE * int(around.near.b[WIDTH]) + N_STATES + _BEFORE
 
 
 def put_in(around: Around, kept: Array, phases: Array) -> None:

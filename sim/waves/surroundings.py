@@ -14,39 +14,43 @@ handing over the sums over the waves as well would take longer than using them.
 
 from __future__ import annotations
 
-from math import cos, sin
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numba.extending import overload
 from numpy.typing import NDArray
 
-from sim.boat.state import PHI, THETA, Z
-from sim.compiled import CHOSEN, CHOSEN_INLINED, inner
+from sim.boat.state import Z
+from sim.compiled import CHOSEN, CHOSEN_INLINED, inlined, inner, outer
 from sim.hull.emergence import Cells, flat_cells, lose
 from sim.waves import passage as wave_passage
 from sim.waves.drift import Drift, mean_load
-from sim.waves.loads import FORCE, PROBES, WATER, Passage, Sea, passage
-from sim.waves.passage import WATER_RATE, blend
+from sim.waves.loads import FORCE, IMPULSE, PROBES, WATER, Passage, Sea, passage
+from sim.waves.passage import CURVE, fit, height, recall, rise
 from sim.waves.pressure import box_top
 
 Array = NDArray[np.float64]
 Whole = NDArray[np.int64]
+Axis = tuple[float, float, float]
+Mean = tuple[float, float, float, float, float, float]
 
 # Floats: time at the start of the step, now, and of the quantities found [s], negative when that is
 # not known; the span of the sums [s]; highest elevation that can come [m]; rho g [N/m^3]; volume
 # [m^3] and its emerged share; decay, least depth and speed step of the mean loads; box around the boat
 # and around its cells, corners [m]; state with velocities relative to the water; load of emergence; added
-# mass of the left-hand side and of the wet part. Then the values of the quantities, and more by ``AT``.
+# mass of the left-hand side and of the wet part; mean load at the end of the span. Then the curves of the
+# quantities over the span, and more by ``AT``.
 START, NOW, VALUES_AT, SPAN_START, SPAN_END, CREST, SPECIFIC_WEIGHT, VOLUME, EMERGED = range(9)
 DECAY, LEAST, SPEED_STEP = 9, 10, 11
-BOX, CELL_BOX, FELT, LOST, ADDED, WET, VALUES = 12, 18, 24, 36, 42, 78, 114
+BOX, CELL_BOX, FELT, LOST, ADDED, WET, MEAN, CURVES = 12, 18, 24, 36, 42, 78, 114, 120
 # Whole numbers: whether there are waves and mean loads; how many quantities, those of them that are always
 # wanted, stations, cells and sections; speeds, headings and depths of the mean loads; where the rest stands.
 WAVES, DRIFT, WIDTH, WANTED, N_STATIONS, N_CELLS, N_SECTIONS = range(7)
 SPEEDS, HEADINGS, DEPTHS = 7, 8, 9
-AT_VALUE, AT_SLOPE, AT_CELLS, AT_DRIFT, AT_PARTS, AT_SECTIONS, AT_DRY = range(10, 17)
-PLACES = 17
+AT_SURFACE, AT_CELLS, AT_DRIFT, AT_PARTS, AT_SECTIONS, AT_DRY = range(10, 16)
+PLACES = 16
+# What stands in the place of the impulse: all that the waves load the submerged boat with.
+LOAD = IMPULSE
 # Times of a flight that differ by less are one [s].
 _SAME_TIME = 1e-9
 
@@ -89,15 +93,13 @@ def surroundings_of(
     volume = np.bincount(cells.section, weights=cells.volumes, minlength=count).astype(float)
     floats, places = flat_cells(cells)
     width = sums.value.shape[1]
-    pieces = (sums.value, sums.slope, floats, drift.loads, parts, volume, np.zeros(count))
-    ends = VALUES + width + np.cumsum([0, *(p.size for p in pieces)])
+    pieces = (np.zeros(sea.stations), floats, drift.loads, parts, volume, np.zeros(count))
+    ends = CURVES + CURVE * width + np.cumsum([0, *(p.size for p in pieces)])
     a, b = np.zeros(ends[-1]), np.zeros(PLACES, dtype=np.int64)
     for start, piece in zip(ends[:-1], pieces, strict=True):
         a[start : start + piece.size] = piece.ravel()
-    b[AT_VALUE : AT_DRY + 1] = ends[:-1]
-    # The sums are made where the right-hand side looks for them.
-    value, slope = (a[at : at + 2 * width].reshape(2, width) for at in ends[:2])
-    sums = sums._replace(time=a[SPAN_START : SPAN_END + 1], value=value, slope=slope)
+    b[AT_SURFACE : AT_DRY + 1] = ends[:-1]
+    sums = sums._replace(time=a[SPAN_START : SPAN_END + 1])
     sums.time[:] = 0.0, -1.0
     a[VALUES_AT], a[CREST], a[SPECIFIC_WEIGHT] = -1.0, sea.crest, specific_weight
     a[VOLUME] = float(sum(cells.volumes))
@@ -125,18 +127,22 @@ def _wet_added_mass(a: Array, b: Whole, share: float) -> None:
             a[WET + i] += left * a[parts + 36 * k + i]
 
 
+@inlined
+def _passed(a: Array) -> float:
+    """Part of the present span that has passed."""
+    return (a[NOW] - a[SPAN_START]) / (a[SPAN_END] - a[SPAN_START])
+
+
 @inner
-def _emerge(a: Array, b: Whole, y: Array) -> float:
+def _emerge(a: Array, b: Whole, y: Array, down: Axis) -> float:
     """Emerged share of the volume; load and added mass of what is left into ``a``."""
-    width, stations = b[WIDTH], b[N_STATIONS]
-    first, surface, lowest = width - stations, VALUES + width - stations, 0.0
+    stations, surface, lowest = b[N_STATIONS], b[AT_SURFACE], 0.0
     if b[WAVES]:
-        span = (a[SPAN_START], a[SPAN_END])
-        blend(a, span[0], span[1], b[AT_VALUE], b[AT_SLOPE], width, a[NOW], first, width, a, VALUES)
-    for i in range(stations):
-        lowest = min(lowest, a[surface + i])
-    st, ct = sin(y[THETA]), cos(y[THETA])
-    if y[Z] + box_top(a, CELL_BOX, -st, ct * sin(y[PHI]), ct * cos(y[PHI])) + lowest > 0.0:
+        t, first = _passed(a), CURVES + CURVE * (b[WIDTH] - stations)
+        for i in range(stations):
+            a[surface + i] = height(a, first + CURVE * i, t)
+            lowest = min(lowest, a[surface + i])
+    if y[Z] + box_top(a, CELL_BOX, down[0], down[1], down[2]) + lowest > 0.0:
         for i in range(6):
             a[LOST + i] = 0.0
         return 0.0
@@ -148,6 +154,61 @@ def _emerge(a: Array, b: Whole, y: Array) -> float:
     return share
 
 
+@inner
+def _mean_load(a: Array, b: Whole, y: Array) -> Mean:
+    size = (b[SPEEDS], b[HEADINGS], b[DEPTHS])
+    return mean_load(a, b[AT_DRIFT], size[0], size[1], size[2], a[DECAY], a[LEAST], a[SPEED_STEP], y)
+
+
+@inner
+def _add_mean(a: Array, b: Whole, y: Array, anew: bool, sums: Passage) -> None:
+    """Add the mean second-order loads to the Froude-Krylov loads at the ends of a span.
+
+    Their slope is that between the ends: they change as slowly as the boat moves.
+    """
+    ahead = _mean_load(a, b, sums.state)
+    if anew:
+        now = _mean_load(a, b, y)
+        for i in range(6):
+            a[MEAN + i] = now[i]
+    for i in range(6):
+        slope = (ahead[i] - a[MEAN + i]) / (a[SPAN_END] - a[SPAN_START])
+        if anew:
+            sums.value[0, FORCE + i] += a[MEAN + i]
+            sums.slope[0, FORCE + i] += slope
+        sums.value[1, FORCE + i] += ahead[i]
+        sums.slope[1, FORCE + i] += slope
+        a[MEAN + i] = ahead[i]
+
+
+@inner
+def _fit(a: Array, sums: Passage) -> None:
+    """Curves of the quantities over the span, and of all that the waves load the submerged boat with."""
+    span = a[SPAN_END] - a[SPAN_START]
+    fit(sums.value, sums.slope, span, a, CURVES)
+    for i in range(6):
+        force, load = CURVES + CURVE * (FORCE + i), CURVES + CURVE * (LOAD + i)
+        for k in range(1, CURVE):
+            a[load + k] = a[force + k]
+        for j in range(6):
+            # The rate of a curve is one of a degree less.
+            water, mass = CURVES + CURVE * (WATER + j), a[ADDED + 6 * i + j] / span
+            for k in range(1, CURVE - 1):
+                a[load + k] += mass * k * a[water + k + 1]
+
+
+@outer
+def _cover(a: Array, b: Whole, sea: Sea, y: Array, time: float, sums: Passage) -> None:
+    """Sums and curves of the span that begins now."""
+    if a[SPAN_END] > a[SPAN_START]:
+        recall(a, CURVES, a[SPAN_END] - a[SPAN_START], sums.value, sums.slope)
+    anew = wave_passage.advance(sea, y, time, sums)
+    if b[DRIFT]:
+        _add_mean(a, b, y, anew, sums)
+    _fit(a, sums)
+    a[VALUES_AT] = -1.0
+
+
 def prepare(around: Around, y: Array, time: float) -> None:
     """Make the surroundings ready for a step that starts at ``y`` [SI] and ``time`` [s]."""
     a = around.near.a
@@ -155,22 +216,24 @@ def prepare(around: Around, y: Array, time: float) -> None:
     # Sums that still cover the time are left alone here: handing them over takes as long as a step.
     covered = a[SPAN_START] <= time < a[SPAN_END] - 1e-9 * (a[SPAN_END] - a[SPAN_START])
     if around.near.b[WAVES] and not covered:
-        a[VALUES_AT] = -1.0
-        wave_passage.advance(around.sea, y, time, around.sums)
+        _cover(a, around.near.b, around.sea, y, time, around.sums)
 
 
 def read_gauge(around: Around, state: Array, rate: Array) -> None:
     """Change depth and its rate to what the boat's depth gauge reads in the pressure of the waves.
+
+    That is p/(rho g) at the body origin and its rate along the motion beside the depth.
 
     Parameters
     ----------
     around : After ``prepare``.
     state, rate : (12,) of the boat at the time of the clock; entry 8 is changed.
     """
-    if around.near.b[WAVES]:
-        head, change = wave_passage.gauge(around.sea, around.sums, around.near.a[NOW])
-        state[Z] += head
-        rate[Z] += change
+    a, b = around.near.a, around.near.b
+    if b[WAVES]:
+        at, t = CURVES + CURVE * b[WANTED], _passed(a)
+        state[Z] += height(a, at, t)
+        rate[Z] += rise(a, at, t) / (a[SPAN_END] - a[SPAN_START])
 
 
 def near_of(around: Around) -> Around:
@@ -186,16 +249,18 @@ def tick(near: Around, offset: float) -> None:
 def observe(near: Around, y: Array) -> None:
     """Wave quantities and relative velocities of state ``y`` at the time of the clock."""
     a, b = near.a, near.b
-    for i in range(12):
+    a[FELT + Z] = y[Z]
+    for i in range(6):
         a[FELT + i] = y[i]
     if b[WAVES]:
         # Two stages of a step are at the same time, and the next step begins where one ends.
         if abs(a[VALUES_AT] - a[NOW]) > _SAME_TIME:
-            span = (a[SPAN_START], a[SPAN_END])
-            blend(a, span[0], span[1], b[AT_VALUE], b[AT_SLOPE], b[WIDTH], a[NOW], 0, b[WANTED], a, VALUES)
+            t = _passed(a)
+            for i in range(LOAD, b[WANTED]):
+                a[CURVES + CURVE * i] = height(a, CURVES + CURVE * i, t)
             a[VALUES_AT] = a[NOW]
         for i in range(6):
-            a[FELT + i] -= a[VALUES + WATER + i]
+            a[FELT + i] -= a[CURVES + CURVE * (WATER + i)]
 
 
 def relative(near: Around, y: Array) -> tuple[Array, int]:
@@ -207,37 +272,47 @@ def plane_inflow(near: Around, plane: int) -> tuple[float, float, float]:
     """Velocity of the water at a plane, body axes [m/s], after ``observe``."""
     if not near.b[WAVES]:
         return 0.0, 0.0, 0.0
-    k = VALUES + PROBES + 3 * plane
-    return near.a[k], near.a[k + 1], near.a[k + 2]
+    k = CURVES + CURVE * (PROBES + 3 * plane)
+    return near.a[k], near.a[k + CURVE], near.a[k + 2 * CURVE]
 
 
 def propeller_inflow(near: Around, planes: int) -> float:
     """Velocity of the water ahead at the propeller [m/s], after ``observe``."""
-    return near.a[VALUES + PROBES + 3 * planes] if near.b[WAVES] else 0.0
+    return near.a[CURVES + CURVE * (PROBES + 3 * planes)] if near.b[WAVES] else 0.0
 
 
-def add_loads(near: Around, y: Array, out: Array) -> None:
-    """Add the loads of waves and emergence, X Y Z K M N body axes [N, N m], to ``out``."""
+@inner
+def _add_emerged(a: Array, share: float, out: Array) -> None:
+    """Loads of waves on a hull that is partly out of the water, to ``out``."""
+    t, span = _passed(a), a[SPAN_END] - a[SPAN_START]
+    for j in range(6):
+        rate = rise(a, CURVES + CURVE * (WATER + j), t) / span
+        for i in range(6):
+            out[i] += a[WET + 6 * i + j] * rate
+    for i in range(6):
+        out[i] += (1.0 - share) * height(a, CURVES + CURVE * (FORCE + i), t)
+
+
+def add_loads(near: Around, y: Array, down: Axis, out: Array) -> None:
+    """Add the loads of waves and emergence, X Y Z K M N body axes [N, N m], to ``out``.
+
+    Parameters
+    ----------
+    down : Vertical axis in body axes, the last row of ``sim.waves.pressure.rotation``.
+    """
     a, b = near.a, near.b
-    share, mass = 0.0, ADDED
-    st, ct = sin(y[THETA]), cos(y[THETA])
-    if y[Z] + box_top(a, BOX, -st, ct * sin(y[PHI]), ct * cos(y[PHI])) < a[CREST]:
-        share = _emerge(a, b, y)
+    share = 0.0
+    if y[Z] + box_top(a, BOX, down[0], down[1], down[2]) < a[CREST]:
+        share = _emerge(a, b, y, down)
         for i in range(6):
             out[i] += a[LOST + i]
-        if share > 0.0:
-            mass = WET
     a[EMERGED] = share
     if b[WAVES]:
-        mean = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-        if b[DRIFT]:
-            size = (b[SPEEDS], b[HEADINGS], b[DEPTHS])
-            mean = mean_load(a, b[AT_DRIFT], size[0], size[1], size[2], a[DECAY], a[LEAST], a[SPEED_STEP], y)
-        for i in range(6):
-            load = (1.0 - share) * (a[VALUES + FORCE + i] + mean[i])
-            for j in range(6):
-                load += a[mass + 6 * i + j] * a[VALUES + WATER_RATE + j]
-            out[i] += load
+        if share > 0.0:
+            _add_emerged(a, share, out)
+        else:
+            for i in range(6):
+                out[i] += a[CURVES + CURVE * (LOAD + i)]
 
 
 def is_emerged(near: Around) -> bool:
@@ -287,7 +362,7 @@ def _calm_propeller_inflow(near: Around, planes: int) -> float:
     return 0.0
 
 
-def _calm_add_loads(near: Around, y: Array, out: Array) -> None:
+def _calm_add_loads(near: Around, y: Array, down: Axis, out: Array) -> None:
     pass
 
 
@@ -340,7 +415,7 @@ def _choose_propeller_inflow(near: Around, planes: int) -> object:
 
 
 @overload(add_loads, jit_options=CHOSEN_INLINED)
-def _choose_add_loads(near: Around, y: Array, out: Array) -> object:
+def _choose_add_loads(near: Around, y: Array, down: Axis, out: Array) -> object:
     return add_loads if len(near) else _calm_add_loads
 
 
