@@ -104,6 +104,12 @@ def test_a_flight_imports_no_library_that_it_does_not_use():
     assert sum(name.partition(".")[0] in ("ident", "sim") for name in found) <= 110
 
 
+def test_a_flight_held_against_a_record_makes_no_units_and_draws_nothing(fitted_db):
+    """Beside what it needs, it loads nothing while it flies either."""
+    _, modules = _loaded(f"import ident; assert ident.validate('hzz20', {fitted_db!r}).errors")
+    assert not {"pint", "dask", "matplotlib", "scipy.optimize", "scipy.interpolate", "xarray"} & set(modules)
+
+
 def _equal(one, other):
     """JSON content without the time stamps of two commits."""
     return json.loads(json.dumps(one)) == json.loads(json.dumps(other))

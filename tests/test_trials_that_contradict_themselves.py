@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import csv
+from importlib.resources import files
+
 import numpy as np
 import pytest
 from click.testing import CliRunner
 from trial_records import truth, turn, write, zigzag
 
-from ident.captive.unit_slips import factor_between
+from ident.captive.quantities import factor
+from ident.captive.unit_slips import factor_between, unit_slips
 from ident.cli import main
 from ident.trials.body import velocities
 from ident.trials.spec import TrialFile, load_spec
@@ -162,8 +166,14 @@ def test_a_header_of_thousands_of_characters_is_found_below_a_title(tmp_path):
     assert measure_trial(path, spec, COUNT).metrics["overshoot_1_deg"].value > 0.0
 
 
-def test_slips_of_units_are_made_from_the_units_themselves():
-    """The numbers one knows: 57.3, 60, 1.94, 3.6, 3.28, 1.852, 3438, 9.81, 1000."""
+def test_slips_of_units_are_those_of_the_units_themselves():
+    """By the library of units; and the numbers one knows: 57.3, 60, 1.94, 3.6, 3.28, 1.852, 3438, 9.81, 1000."""
+    with (files("ident") / "data" / "unit_slips.csv").open(encoding="utf-8") as stream:
+        listed = list(csv.DictReader(stream))
+    assert [one["words"] for one in listed] == list(unit_slips())
+    for one in listed:
+        unit, instead = (factor(one["like"], one[name]) for name in ("unit", "instead"))
+        assert abs(unit_slips()[one["words"]] * instead / unit - 1.0) < 1e-14, one
     known = (57.29578, 60.0, 1.943844, 3.6, 3.280840, 1.852, 3437.747, 9.80665, 1000.0)
     for value in known:
         for ratio in (value, 1.0 / value):
