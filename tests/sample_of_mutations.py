@@ -57,7 +57,7 @@ class Subject:
     weight: float
     files: dict[Path, str] = field(default_factory=dict)
     usual: dict[str, list[float]] = field(default_factory=dict)
-    loud: list[tuple[str, str]] = field(default_factory=list)
+    loud: list[tuple[str, str, str]] = field(default_factory=list)
 
 
 def subjects(place: Path, cases: Path | None) -> list[Subject]:
@@ -180,6 +180,12 @@ def changes(before: dict[str, list[float]], after: dict[str, list[float]]) -> st
     return "; ".join(words) + (f"; ... {len(both)} changed, {len(gone)} came or went") if words else "nothing"
 
 
+def loud(findings) -> list[tuple[str, str, str]]:
+    """Check and severity of what is said aloud; and which terms are missing, for something always is."""
+    words = [(f.check, f.severity, f.what if f.check == "missing" else "") for f in findings]
+    return [w for w in words if w[1] != "info"]
+
+
 def begin(subject: Subject) -> bool:
     """Its files, and what it leads to as it is."""
     names = [p for p in sorted(subject.folder.rglob("*")) if p.suffix in (".toml", ".csv", ".txt", ".out", ".dat")]
@@ -189,7 +195,7 @@ def begin(subject: Subject) -> bool:
     own = [p for p in own if p.stat().st_size < 300_000 and not (subject.name == "hmri" and unread.match(p.name))]
     subject.files = {p: p.read_bytes().decode("utf-8", "surrogateescape") for p in own}
     subject.usual, findings, no = outcome(subject.folder)
-    subject.loud = [(f.check, f.severity) for f in findings if f.severity != "info"]
+    subject.loud = loud(findings)
     return not no
 
 
@@ -214,13 +220,12 @@ def one(subject: Subject, seed: int, db: Path) -> dict[str, object]:
         if no:
             line |= {"what": "refused", "text": no[:400]}
         else:
-            now = collections.Counter((f.check, f.severity) for f in findings if f.severity != "info")
-            more = now - collections.Counter(subject.loud)
-            errors = sorted({c for c, s in more if s == "error"})
+            more = collections.Counter(loud(findings)) - collections.Counter(subject.loud)
+            errors = [c for c, s, _ in more if s == "error"]
             what = "error" if errors else "warning" if more else "accepted"
             if what == "accepted" and values == subject.usual:
                 what = "nothing changed"
-            line |= {"what": what, "text": changes(subject.usual, values), "checks": sorted({c for c, _ in more})}
+            line |= {"what": what, "text": changes(subject.usual, values), "checks": sorted({c for c, *_ in more})}
     except Exception:
         line |= {"what": "fault", "text": traceback.format_exc()[-3000:]}
     finally:

@@ -31,7 +31,9 @@ from ident.checks import physics as checks_physics
 from ident.checks import planes as checks_planes
 from ident.checks import possible as checks_possible
 from ident.checks import potential as checks_potential
+from ident.checks import propeller as checks_propeller
 from ident.checks import proportions as checks_proportions
+from ident.checks import ratios as checks_ratios
 from ident.checks import resistance as checks_resistance
 from ident.checks import runs as checks_runs
 from ident.checks import tables as checks_tables
@@ -60,7 +62,9 @@ _MODULES = (
     checks_planes,
     checks_possible,
     checks_potential,
+    checks_propeller,
     checks_proportions,
+    checks_ratios,
     checks_resistance,
     checks_runs,
     checks_tables,
@@ -206,7 +210,8 @@ def check_campaign(
     if not campaign.runs.empty:
         known = identified or identify(campaign)
         values = checks_coefficients.constant_values(known)
-        evidence = replace(evidence, fitted=checks_fitted.residuals(known), constants=values)
+        shares = checks_coefficients.tabulated_values(known)
+        evidence = replace(evidence, fitted=checks_fitted.residuals(known), constants=values, tabulated=shares)
         if not campaign.vehicle.terms_of.tabulated:
             evidence = replace(evidence, derivatives=_of_hull(values))
     return findings_of(evidence, tell)

@@ -29,6 +29,14 @@ def constant_values(identified: Identification) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=["coefficient", "part", "value", "stderr"])
 
 
+def tabulated_values(identified: Identification) -> pd.DataFrame:
+    """Points of coefficients with axes that have a range: columns coefficient, part, value, stderr."""
+    errors = np.sqrt(np.diag(identified.covariance))
+    every = zip(identified.nodes, identified.values, errors, strict=True)
+    rows = [(n.name, n.part, float(v), float(e)) for n, v, e in every if n.point and n.name in _ranges()]
+    return pd.DataFrame(rows, columns=["coefficient", "part", "value", "stderr"])
+
+
 @cache
 def _ranges() -> dict[str, tuple[float, float, str]]:
     """Coefficient -> lowest and highest value, and why."""
@@ -45,7 +53,9 @@ def values_a_boat_may_have(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
         return
     norms = {t.name: t.norm for t in vehicle_terms(vehicle)}
     thrust = bool(((runs["n"].fillna(0.0) != 0.0) & (runs["part"] == "hull") & runs["X"].notna()).any())
-    for row in values[values["coefficient"].isin(list(_ranges()))].to_dict("records"):
+    tables = [t for t in (values, evidence.tabulated) if t is not None and len(t)]
+    of_range = [t[t["coefficient"].isin(list(_ranges()))] for t in tables]
+    for row in (row for t in of_range for row in t.to_dict("records")):
         name, part = str(row["coefficient"]), str(row["part"])
         value, error = float(row["value"]), float(row["stderr"])
         low, high, basis = _ranges()[name]

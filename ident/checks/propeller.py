@@ -1,0 +1,109 @@
+"""Checks of propellers: the energy that a thrust takes, the slope of its curve, side loads, what propels the boat."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from ident.checks.findings import Array, Evidence, Finding, Rule, check, kept, rows_of, together
+from sim.boat.parts import vehicle_terms
+
+
+def ideal_efficiency(advance: Array, thrust: Array, share: float = 1.0) -> Array:
+    """Efficiency that no propeller exceeds: that of an actuator disk, 2 / (1 + sqrt(1 + share C_T)).
+
+    Parameters
+    ----------
+    advance : J above zero.
+    thrust : K_T, not below zero; C_T = 8 K_T / (pi J^2).
+    share : Of the thrust that is the propeller's own: below 1 in a duct that thrusts too.
+
+    References
+    ----------
+    Carlton (2018), Marine Propellers and Propulsion, 8.2: Rankine and Froude's momentum theory.
+
+    Examples
+    --------
+    >>> float(ideal_efficiency(np.array([1.0]), np.array([0.375 * np.pi])).round(9)[0])
+    0.666666667
+    """
+    return np.asarray(2.0 / (1.0 + np.sqrt(1.0 + share * 8.0 * thrust / (math.pi * advance**2))))
+
+
+@check("open_water")
+def energy_of_the_wake(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
+    """The best efficiency over that of an actuator disk: above one it comes from nothing."""
+    runs, limits = evidence.runs, rule.limits
+    ahead = runs[(runs["test"] == "open_water") & (runs["J"] > 0.0) & (runs["KT"] > 0.0) & (runs["KQ"] > 0.0)]
+    ahead = ahead[kept(ahead, "KT") & kept(ahead, "KQ")]
+    for file, group in ahead.groupby("file", sort=False):
+        j, kt, kq = (group[c].to_numpy(float) for c in ("J", "KT", "KQ"))
+        efficiency = j * kt / (2.0 * math.pi * kq)
+        share = efficiency / ideal_efficiency(j, kt)
+        ducted = efficiency / ideal_efficiency(j, kt, limits["ducted"])
+        worst, best = int(share.argmax()), float(share.max())
+        if limits["ideal_low"] <= best <= limits["ideal_high"]:
+            continue
+        impossible = bool((ducted > 1.0).any())
+        what = f"efficiency {efficiency[worst]:.3g} at J = {j[worst]:g} in run {group['run_id'].iloc[worst]} is "
+        what += f"{best:.2g} of an actuator disk's, propellers have {limits['ideal_low']:g} to {limits['ideal_high']:g}"
+        what += ": KT, KQ or J of another row, curve or unit?"
+        yield rule.finding(str(file), rows_of(group), ["KT", "KQ"], what, "" if impossible else "warning")
+
+
+@check("open_water")
+def thrust_over_advance(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
+    """The mean slope of KT over J, which the pitch hardly changes: J of another unit, or one column shifted."""
+    runs, limits = evidence.runs, rule.limits
+    ahead = runs[(runs["test"] == "open_water") & (runs["J"] >= 0.0) & kept(runs, "KT")]
+    for file, group in ahead.groupby("file", sort=False):
+        j, kt = group["J"].to_numpy(float), group["KT"].to_numpy(float)
+        if np.unique(j).size < 3:
+            continue
+        slope = float(np.polyfit(j, kt, 1)[0])
+        # One that rises is another finding.
+        if slope < 0.0 and not limits["slope_low"] <= -slope <= limits["slope_high"]:
+            what = f"KT falls by {-slope:.3g} over a unit of J, propellers have {limits['slope_low']:g} to "
+            what += f"{limits['slope_high']:g}: the unit of J, or KT of another row?"
+            yield rule.finding(str(file), rows_of(group), ["J", "KT"], what, "warning")
+
+
+@check("side_force")
+def force_over_the_angle(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
+    """Side loads of a propeller over the angle of the flow at the stern and the load of its disk, 1/2 rho U^2 A."""
+    body, vehicle, runs = evidence.body, evidence.vehicle, evidence.runs
+    if body is None or vehicle is None or vehicle.propeller is None:
+        return
+    disk = 0.25 * math.pi * vehicle.diameter**2
+    side = runs[(runs["test"] == "propeller_side_force") & (runs["U"].fillna(0.0) > 0.0)]
+    for force, rate, angle in (("Y", "r", "beta"), ("Z", "q", "alpha")):
+        given = side[kept(side, force) & (side[force] != 0.0)]
+        turned = (given[rate].fillna(0.0) * 0.5 * body.length / given["U"]).abs()
+        flow = turned.where(turned > 0.0, np.sin(given[angle].fillna(0.0)).abs())
+        size = given[force].abs() / (0.5 * body.density * given["U"] ** 2 * disk * flow.where(flow > 0.0))
+        for file, group in given.groupby(together(given), sort=False):
+            median = float(size[group.index].median())
+            if not math.isfinite(median) or rule.limits["low"] <= median <= rule.limits["high"]:
+                continue
+            far = not rule.limits["none"] <= median <= rule.limits["most"]
+            what = f"{force} of the propeller is {median:.3g} times 1/2 rho U^2 of its disk and the angle of the flow "
+            what += f"at the stern, propellers have {rule.limits['low']:g} to {rule.limits['high']:g}: the unit of "
+            what += f"{rate}, {angle} or {force}?"
+            yield rule.finding(str(file), rows_of(group), [force, rate], what, "error" if far else "")
+
+
+@check("essential")
+def what_the_propeller_is_measured_for(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
+    """Runs at the propulsion point of which none has revolutions: they leave no wake fraction."""
+    campaign, runs = evidence.campaign, evidence.runs
+    if campaign is None or "w_T" not in {t.name for t in vehicle_terms(campaign.vehicle)}:
+        return
+    points = runs[runs["test"] == "self_propulsion"]
+    if "coefficient" in runs and bool((runs["coefficient"] == "w_T").any()):
+        return
+    if len(points) and not bool((points["n"].fillna(0.0) != 0.0).any()):
+        what = f"none of {len(points)} runs at the propulsion point has revolutions: no wake fraction w_T, "
+        what += "and the boat's speed comes from thrust in undisturbed water"
+        yield rule.finding(str(points["file"].iloc[0]), rows_of(points), ["n"], what, "warning")

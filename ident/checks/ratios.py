@@ -1,0 +1,178 @@
+"""Coefficients beside each other and beside the boat's own size: a unit in one load of one test alone."""
+
+from __future__ import annotations
+
+import csv
+import math
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
+
+from ident.checks.findings import HULL, Evidence, Finding, Rule, check, printed_place
+from ident.checks.physics import apparent_inertia, slope
+from ident.checks.potential import over_a_rate
+from ident.checks.resistance import spheroid_diameter
+from sim.boat.parts import vehicle_terms
+
+# Value and standard error.
+Known = Mapping[str, tuple[float, float]]
+# Test, angle, load -> name of its slope in prime form.
+_SLOPES = (
+    ("drift_horizontal", "beta", "Y", "Y_v"),
+    ("drift_horizontal", "beta", "N", "N_v"),
+    ("drift_vertical", "alpha", "Z", "Z_w"),
+    ("drift_vertical", "alpha", "M", "M_w"),
+)
+# Coefficients of the resistance.
+RESISTANCE = ("X_uu", "X_0", "X_u|u|")
+_RATES = (("p", "K"), ("q", "Z"), ("q", "M"), ("r", "Y"), ("r", "N"))
+
+
+@dataclass(frozen=True)
+class Proportion:
+    """One row of ``data/coefficient_proportions.csv``.
+
+    Attributes
+    ----------
+    names : Coefficients of which the first known is judged.
+    over : What it is divided by: sums and products of coefficients and of the boat's ``mass`` and ``diameter``,
+        of which the first known is taken.
+    low, high : Between which the quotient is.
+    severity : Of a finding.
+    sets : Term sets whose terms of that name are meant; all where there is none.
+    basis : Where the limits are from.
+    """
+
+    names: tuple[str, ...]
+    over: tuple[str, ...]
+    low: float
+    high: float
+    severity: str
+    sets: tuple[str, ...]
+    basis: str
+
+
+@cache
+def proportions() -> tuple[Proportion, ...]:
+    """The rows of ``data/coefficient_proportions.csv``."""
+    with (files("ident") / "data" / "coefficient_proportions.csv").open(encoding="utf-8") as stream:
+        return tuple(
+            Proportion(
+                tuple(r["coefficient"].split()),
+                tuple(r["over"].split()),
+                float(r["low"]),
+                float(r["high"]),
+                r["severity"],
+                tuple(r["sets"].split()),
+                r["basis"],
+            )
+            for r in csv.DictReader(stream)
+        )
+
+
+def evaluated(text: str, known: Known) -> tuple[float, float] | None:
+    """Value and standard error of a sum of products of what is known; None where one is not.
+
+    Examples
+    --------
+    >>> evaluated("X_udot-Z_wdot", {"X_udot": (-1.0, 0.0), "Z_wdot": (-31.0, 3.0)})
+    (30.0, 3.0)
+    >>> evaluated("mass*diameter*diameter", {"mass": (2.0, 0.0), "diameter": (0.1, 0.0)})
+    (0.020000000000000004, 0.0)
+    """
+    total, variance = 0.0, 0.0
+    for sign, product in re.findall(r"([+-]?)([^+-]+)", text):
+        value, relative = -1.0 if sign == "-" else 1.0, 0.0
+        for name in product.split("*"):
+            if name not in known:
+                return None
+            one, error = known[name]
+            value *= one
+            relative = math.hypot(relative, error / one) if one else math.inf
+        total += value
+        variance += (value * relative) ** 2 if value else 0.0
+    return total, math.sqrt(variance)
+
+
+def _of_runs(evidence: Evidence) -> dict[str, tuple[float, float]]:
+    """Slopes of the runs in prime form, for a boat whose coefficients have axes."""
+    body, runs = evidence.body, evidence.runs
+    assert body is not None
+    hull = runs[runs["part"].isin(HULL)]
+    found = {n: slope(hull[hull["test"] == test], angle, load, body) for test, angle, load, n in _SLOPES}
+    for rate, load in _RATES:
+        for _, _, value in over_a_rate(runs, rate, load, body):
+            found.setdefault(f"{load}_{rate}", value)
+    unit = 0.5 * body.density * body.length**3
+    for _, acceleration, _, apparent in apparent_inertia(evidence):
+        load = dict(zip(("u", "v", "w", "p", "q", "r"), "XYZKMN", strict=True))[acceleration[0]]
+        power = 1.0 if load in "XYZ" else body.length**2
+        found.setdefault(f"{load}_{acceleration}", -apparent / unit / power)
+    return {n: (v, 0.0) for n, v in found.items() if math.isfinite(v)}
+
+
+def _known(evidence: Evidence) -> dict[str, tuple[float, float]]:
+    """What is identified or published of hull and planes in 1/2 rho L^n, and the boat's size in the same form."""
+    body, vehicle = evidence.body, evidence.vehicle
+    assert body is not None
+    assert vehicle is not None
+    known: dict[str, tuple[float, float]] = {}
+    if body.mass is not None:
+        known["mass"] = body.mass / (0.5 * body.density * body.length**3), 0.0
+        known["diameter"] = spheroid_diameter(body) / body.length, 0.0
+    if vehicle.terms_of.tabulated:
+        return known | _of_runs(evidence)
+    norms = {t.name: t.norm for t in vehicle_terms(vehicle)}
+    table = evidence.constants
+    if table is None:
+        return known
+    table = table[table["coefficient"].map(norms) == "rho/2 L"]
+    rows = zip(table["coefficient"], table["value"], table["stderr"], strict=True)
+    return {str(n): (float(v), float(e)) for n, v, e in rows} | known
+
+
+@check("proportion")
+def coefficients_beside_each_other(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
+    """Quotients of coefficients, and of coefficients over the boat's size, beyond what boats have."""
+    vehicle = evidence.vehicle
+    if evidence.body is None or vehicle is None or evidence.runs.empty:
+        return
+    known = _known(evidence)
+    for row in proportions():
+        if row.sets and vehicle.term_set not in row.sets:
+            continue
+        name = next((n for n in row.names if n in known), "")
+        over = next((o for o in row.over if evaluated(o, known) is not None), "")
+        # The resistance of runs is the check `friction`'s, beside the Reynolds number and what thrust leaves of it.
+        if not name or not over or (name in RESISTANCE and not printed_place(evidence.runs, [name])[1]):
+            continue
+        severity = beyond(row, known[name], evaluated(over, known) or (0.0, 0.0), rule.limits)
+        if not severity:
+            continue
+        value, base = known[name][0], (evaluated(over, known) or (0.0, 0.0))[0]
+        shown = over.replace("*", " ")
+        what = f"{name} = {value:.4g} over {shown} = {base:.4g} is {value / base if base else math.inf:.3g}, "
+        what += f"boats have {row.low:g} to {row.high:g}: {row.basis}"
+        place = printed_place(evidence.runs, [name])
+        yield rule.finding(place[0], place[1], ["value"] if place[1] else [name], what, severity)
+
+
+def beyond(row: Proportion, value: tuple[float, float], base: tuple[float, float], limits: Mapping[str, float]) -> str:
+    """Severity of a quotient beyond its limits by more than its errors explain; nothing inside.
+
+    An error where it is beyond by the factor ``gross`` too.
+    """
+    if not base[0] or not all(map(math.isfinite, (*value, *base))):
+        return ""
+    quotient = value[0] / base[0]
+    relative = base[1] / abs(base[0])
+    slack = limits["errors"] * math.hypot(value[1] / base[0], quotient * relative)
+    # A base that may be zero has no quotient.
+    if limits["errors"] * relative >= 1.0 or row.low - slack <= quotient <= row.high + slack:
+        return ""
+    edge = row.low if quotient < row.low else row.high
+    away = quotient / edge if edge else math.inf
+    within = 1.0 / limits["gross"] <= away <= limits["gross"]
+    return row.severity if within or away <= 0.0 or not edge else "error"
