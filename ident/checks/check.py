@@ -35,6 +35,7 @@ from ident.checks import propeller as checks_propeller
 from ident.checks import proportions as checks_proportions
 from ident.checks import ratios as checks_ratios
 from ident.checks import resistance as checks_resistance
+from ident.checks import rows as checks_rows
 from ident.checks import runs as checks_runs
 from ident.checks import tables as checks_tables
 from ident.checks import zeros as checks_zeros
@@ -66,6 +67,7 @@ _MODULES = (
     checks_proportions,
     checks_ratios,
     checks_resistance,
+    checks_rows,
     checks_runs,
     checks_tables,
     checks_zeros,

@@ -30,10 +30,10 @@ def constant_values(identified: Identification) -> pd.DataFrame:
 
 
 def tabulated_values(identified: Identification) -> pd.DataFrame:
-    """Points of coefficients with axes that have a range: columns coefficient, part, value, stderr."""
+    """Coefficients with axes, a row a point: columns coefficient, part, value, stderr."""
     errors = np.sqrt(np.diag(identified.covariance))
     every = zip(identified.nodes, identified.values, errors, strict=True)
-    rows = [(n.name, n.part, float(v), float(e)) for n, v, e in every if n.point and n.name in _ranges()]
+    rows = [(n.name, n.part, float(v), float(e)) for n, v, e in every if n.point]
     return pd.DataFrame(rows, columns=["coefficient", "part", "value", "stderr"])
 
 

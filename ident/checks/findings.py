@@ -158,7 +158,7 @@ class Evidence:
     campaign : The whole campaign, when the runs are one.
     fitted : Columns coefficient, part, worst (largest residual of its runs, in their standard errors), run.
     constants : Columns coefficient, part, value, stderr: what has no axis, of any part.
-    tabulated : The same of coefficients with axes that have a range, a row a point.
+    tabulated : The same of coefficients with axes, a row a point.
     derivatives, reference : Columns coefficient, value, file, row; the second in the norm
         the first claims.
     labels : Columns sheet, column, description, file, row.

@@ -174,7 +174,7 @@ def turns_pushed_at_the_stern(evidence: Evidence, rule: Rule) -> Iterator[Findin
             yield rule.finding(*printed_place(evidence.runs, [turn]), [turn], what)
 
 
-def over_a_rate(runs: pd.DataFrame, rate: str, output: str, body: Body) -> Iterator[tuple[str, list[int], float]]:
+def _over_a_rate(runs: pd.DataFrame, rate: str, output: str, body: Body) -> Iterator[tuple[str, list[int], float]]:
     """File, rows and slope of a load over a rate, in prime form, of boats with way on and no angle of flow."""
     others = [r for r in "pqr" if r != rate]
     straight = (runs[["alpha", "beta"]].fillna(0.0).abs() < _STRAIGHT).all(axis=1)
@@ -197,14 +197,14 @@ def turns_of_tabulated_boats(evidence: Evidence, rule: Rule) -> Iterator[Finding
     if body is None or vehicle is None or not vehicle.terms_of.tabulated:
         return
     for rate, output in (("p", "K"), ("q", "M"), ("r", "N")):
-        for file, rows, found in over_a_rate(evidence.runs, rate, output, body):
+        for file, rows, found in _over_a_rate(evidence.runs, rate, output, body):
             if found > 0.0:
                 what = f"{output} over {rate} is {found:.3g} (prime form): it drives the turn on, as no water does"
                 yield rule.finding(file, rows, [output, rate], what, "error")
     for (test, angle, force, *_), rate, sense in zip(_PLANES, "rq", (1.0, -1.0), strict=True):
         of_test = evidence.runs[(evidence.runs["test"] == test) & evidence.runs["part"].isin(HULL)]
         lift = slope(of_test, angle, force, body)
-        for file, rows, found in over_a_rate(evidence.runs, rate, force, body):
+        for file, rows, found in _over_a_rate(evidence.runs, rate, force, body):
             if sense * found < -rule.limits["share"] * abs(lift):
                 what = f"{force} over {rate} is {found:.3g}, over {angle} {lift:.3g} (prime form): it acts ahead of "
                 what += "the moment point, where a hull and its stern planes have it behind"

@@ -10,9 +10,10 @@ from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
 
+import numpy as np
+
 from ident.checks.findings import HULL, Evidence, Finding, Rule, check, printed_place
-from ident.checks.physics import apparent_inertia, slope
-from ident.checks.potential import over_a_rate
+from ident.checks.physics import slope
 from ident.checks.resistance import spheroid_diameter
 from sim.boat.parts import vehicle_terms
 
@@ -25,9 +26,6 @@ _SLOPES = (
     ("drift_vertical", "alpha", "Z", "Z_w"),
     ("drift_vertical", "alpha", "M", "M_w"),
 )
-# Coefficients of the resistance.
-RESISTANCE = ("X_uu", "X_0", "X_u|u|")
-_RATES = (("p", "K"), ("q", "Z"), ("q", "M"), ("r", "Y"), ("r", "N"))
 
 
 @dataclass(frozen=True)
@@ -42,6 +40,7 @@ class Proportion:
     low, high : Between which the quotient is.
     severity : Of a finding.
     sets : Term sets whose terms of that name are meant; all where there is none.
+    printed : Whether it is asked of published values alone.
     basis : Where the limits are from.
     """
 
@@ -51,6 +50,7 @@ class Proportion:
     high: float
     severity: str
     sets: tuple[str, ...]
+    printed: bool
     basis: str
 
 
@@ -66,6 +66,7 @@ def proportions() -> tuple[Proportion, ...]:
                 float(r["high"]),
                 r["severity"],
                 tuple(r["sets"].split()),
+                r["printed"] == "yes",
                 r["basis"],
             )
             for r in csv.DictReader(stream)
@@ -97,19 +98,11 @@ def evaluated(text: str, known: Known) -> tuple[float, float] | None:
 
 
 def _of_runs(evidence: Evidence) -> dict[str, tuple[float, float]]:
-    """Slopes of the runs in prime form, for a boat whose coefficients have axes."""
+    """Slopes of the runs over an angle in prime form, for a boat whose coefficients have axes."""
     body, runs = evidence.body, evidence.runs
     assert body is not None
     hull = runs[runs["part"].isin(HULL)]
     found = {n: slope(hull[hull["test"] == test], angle, load, body) for test, angle, load, n in _SLOPES}
-    for rate, load in _RATES:
-        for _, _, value in over_a_rate(runs, rate, load, body):
-            found.setdefault(f"{load}_{rate}", value)
-    unit = 0.5 * body.density * body.length**3
-    for _, acceleration, _, apparent in apparent_inertia(evidence):
-        load = dict(zip(("u", "v", "w", "p", "q", "r"), "XYZKMN", strict=True))[acceleration[0]]
-        power = 1.0 if load in "XYZ" else body.length**2
-        found.setdefault(f"{load}_{acceleration}", -apparent / unit / power)
     return {n: (v, 0.0) for n, v in found.items() if math.isfinite(v)}
 
 
@@ -122,15 +115,17 @@ def _known(evidence: Evidence) -> dict[str, tuple[float, float]]:
     if body.mass is not None:
         known["mass"] = body.mass / (0.5 * body.density * body.length**3), 0.0
         known["diameter"] = spheroid_diameter(body) / body.length, 0.0
-    if vehicle.terms_of.tabulated:
-        return known | _of_runs(evidence)
     norms = {t.name: t.norm for t in vehicle_terms(vehicle)}
-    table = evidence.constants
-    if table is None:
-        return known
-    table = table[table["coefficient"].map(norms) == "rho/2 L"]
-    rows = zip(table["coefficient"], table["value"], table["stderr"], strict=True)
-    return {str(n): (float(v), float(e)) for n, v, e in rows} | known
+    if vehicle.terms_of.tabulated:
+        known |= _of_runs(evidence)
+    # Of a table the largest value.
+    for table in (evidence.tabulated, evidence.constants):
+        of_norm = table[table["coefficient"].map(norms) == "rho/2 L"] if table is not None and len(table) else None
+        if of_norm is not None:
+            of_norm = of_norm.sort_values("value", key=np.abs)
+            rows = zip(of_norm["coefficient"], of_norm["value"], of_norm["stderr"], strict=True)
+            known |= {str(n): (float(v), float(e)) for n, v, e in rows}
+    return known
 
 
 @check("proportion")
@@ -145,8 +140,8 @@ def coefficients_beside_each_other(evidence: Evidence, rule: Rule) -> Iterator[F
             continue
         name = next((n for n in row.names if n in known), "")
         over = next((o for o in row.over if evaluated(o, known) is not None), "")
-        # The resistance of runs is the check `friction`'s, beside the Reynolds number and what thrust leaves of it.
-        if not name or not over or (name in RESISTANCE and not printed_place(evidence.runs, [name])[1]):
+        place = printed_place(evidence.runs, [name]) if name else ("", [])
+        if not name or not over or (row.printed and not place[1]):
             continue
         severity = beyond(row, known[name], evaluated(over, known) or (0.0, 0.0), rule.limits)
         if not severity:
@@ -155,7 +150,6 @@ def coefficients_beside_each_other(evidence: Evidence, rule: Rule) -> Iterator[F
         shown = over.replace("*", " ")
         what = f"{name} = {value:.4g} over {shown} = {base:.4g} is {value / base if base else math.inf:.3g}, "
         what += f"boats have {row.low:g} to {row.high:g}: {row.basis}"
-        place = printed_place(evidence.runs, [name])
         yield rule.finding(place[0], place[1], ["value"] if place[1] else [name], what, severity)
 
 
@@ -166,11 +160,17 @@ def beyond(row: Proportion, value: tuple[float, float], base: tuple[float, float
     """
     if not base[0] or not all(map(math.isfinite, (*value, *base))):
         return ""
-    quotient = value[0] / base[0]
-    relative = base[1] / abs(base[0])
-    slack = limits["errors"] * math.hypot(value[1] / base[0], quotient * relative)
+    quotient, relative = value[0] / base[0], base[1] / abs(base[0])
     # A base that may be zero has no quotient.
-    if limits["errors"] * relative >= 1.0 or row.low - slack <= quotient <= row.high + slack:
+    if limits["errors"] * relative >= 1.0:
+        return ""
+    of_value = value[1] / abs(value[0]) if value[0] else 0.0
+    slack = limits["errors"] * math.hypot(value[1] / base[0], quotient * relative)
+    # A large value with a large error is large all the same: towards zero errors are added, away from it they multiply.
+    stretch = 1.0 + limits["errors"] * math.hypot(of_value, relative)
+    low = row.low * stretch if row.low < 0.0 else row.low - slack
+    high = row.high * stretch if row.high > 0.0 else row.high + slack
+    if low <= quotient <= high or (quotient * (row.low + row.high) < 0.0 and abs(quotient) < slack):
         return ""
     edge = row.low if quotient < row.low else row.high
     away = quotient / edge if edge else math.inf

@@ -117,6 +117,9 @@ def _text_sheet(path: Path, source: Source, dialect: Dialect, header: list[str],
                 if len(texts) > len(header):
                     text = f"at most {len(header)}, as in the header"
                     raise InputError(f"{path}, row {row}", f"{len(texts)} cells", text)
+                if len(texts) < len(header) and not block.ended and row == block.rows[-1]:
+                    text = f"{len(header)} cells, as in the header: or a line end: is the file cut short?"
+                    raise InputError(f"{path}, row {row}", f"{len(texts)} cells and no line end", text)
                 # Spreadsheets drop blank cells at the end of a row.
                 yield row, texts + [""] * (len(header) - len(texts))
 

@@ -1,0 +1,181 @@
+"""Authority: proportions that physics leaves to a boat. One load of one test in another unit, a published cross term
+of the other sign, a propeller that gives more than an actuator disk, rows that lost what they exclude: each is named.
+
+The bundled campaigns and the starter have none of it; the limits have their sources in the tables of ``ident/data``.
+"""
+
+from __future__ import annotations
+
+import re
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from sample_of_mutations import STARTER, TABLES
+
+from ident.captive.campaign import read_campaign
+from ident.checks.check import check_campaign
+from ident.checks.propeller import ideal_efficiency
+from ident.checks.ratios import Proportion, beyond, evaluated, proportions
+from sim.boat.catalogue import SETS, terms
+from sim.files.errors import InputError
+
+ROOT = Path(__file__).parents[1]
+CHECKS = ("proportion", "side_force", "rows", "open_water", "coefficient", "essential")
+
+
+@pytest.fixture
+def place(tmp_path):
+    """A folder with a copy of a campaign, by name."""
+
+    def copied(boat: str) -> Path:
+        if boat != "starter":
+            shutil.copytree(ROOT / "raw_captive_data" / boat, tmp_path / boat)
+            return tmp_path / boat
+        shutil.copytree(STARTER, tmp_path / boat)
+        folder = tmp_path / boat / "captive"
+        shutil.rmtree(folder / "histories")
+        header = folder / "campaign.toml"
+        header.write_text(TABLES.match(header.read_text("utf-8"))[0], "utf-8")
+        return folder
+
+    return copied
+
+
+def found(folder: Path) -> list[tuple[str, str, str]]:
+    findings = check_campaign(read_campaign(folder), folder)
+    return [(f.check, f.severity, f.what) for f in findings if f.check in CHECKS and f.severity != "info"]
+
+
+@pytest.mark.parametrize(
+    "boat",
+    ["starter", "bb2", "suboff", "kvlcc2", "kvlcc2-mmg", "kvlcc2-ship", "remus100", "remus100-x", "lauv", "nps-auv2"],
+)
+def test_boats_as_they_are_have_none(place, boat):
+    assert found(place(boat)) == []
+
+
+def times(column: str, by: float, rows: slice = slice(None)):
+    def change(table: pd.DataFrame) -> None:
+        values = table.loc[table.index[rows], column]
+        table.loc[table.index[rows], column] = [f"{by * float(x):.7g}" if x else x for x in values]
+
+    return change
+
+
+def value(name: str, by: float):
+    def change(table: pd.DataFrame) -> None:
+        is_it = table["coefficient"] == name
+        assert is_it.any()
+        table.loc[is_it, "value"] = [f"{by * float(x):.7g}" for x in table.loc[is_it, "value"]]
+
+    return change
+
+
+def renamed(old: str, new: str):
+    def change(table: pd.DataFrame) -> None:
+        assert old in table
+        table.columns = [new if c == old else c for c in table.columns]
+
+    return change
+
+
+def emptied(column: str):
+    def change(table: pd.DataFrame) -> None:
+        table[column] = ""
+
+    return change
+
+
+def put(column: str, row: int, text: str):
+    def change(table: pd.DataFrame) -> None:
+        table.loc[table.index[row], column] = text
+
+    return change
+
+
+def shifted(column: str):
+    """A column that begins a row later, without a value in its last row's place."""
+
+    def change(table: pd.DataFrame) -> None:
+        table[column] = [*table[column][1:], "-0.08"]
+
+    return change
+
+
+SLIPS = {
+    "roll damping in N mm": ("starter", "arm_p.csv", times("K_Nm", 1e3), "proportion", "error", "K_up"),
+    "ten times the force by pitch": ("starter", "arm_q.csv", times("Z_N", 10.0), "proportion", "warning", "Z_uq"),
+    "pounds in one load of a turn": ("starter", "arm_r.csv", times("N_Nm", 1 / 14.5), "proportion", "warning", "N_ur"),
+    "roll inertia": ("starter", "acceleration_pdot.csv", times("K_Nm", 0.01), "proportion", "error", "K_pdot"),
+    "a cross term turned": ("remus100", "published.csv", value("M_uwa", -1.0), "proportion", "error", "M_uwa"),
+    "one of a table's sign": ("nps-auv2", "published.csv", value("X_vr", -1.0), "proportion", "error", "X_vr"),
+    "another row's value": ("remus100", "published.csv", value("M_vp", 48.7), "proportion", "error", "M_vp"),
+    "a lever of the other end": ("remus100", "published.csv", value("Z_uqf", -1.0), "proportion", "error", "Z_uqf"),
+    "degrees for a rate": ("bb2", "estimates.csv", renamed("p_radps", "p_degps"), "proportion", "error", "K_up"),
+    "a thrust deduction of the other sign": (
+        "bb2", "self_propulsion.csv", times("t", -1.0, slice(3)), "coefficient", "error", "t (propeller)"),
+    "revolutions lost": ("bb2", "self_propulsion.csv", emptied("n_rps"), "essential", "warning", "w_T"),
+    "degrees for radians at the propeller": (
+        "bb2", "propeller_side_force.csv", renamed("q_radps", "q_degps"), "side_force", "error", "Z of the propeller"),
+    "a torque of half": ("starter", "open_water.csv", times("KQ", 0.514444), "open_water", "error", "actuator disk"),
+    "a torque of twice": ("starter", "open_water.csv", times("KQ", 1.943844), "open_water", "warning", "actuator disk"),
+    "thrust a row too low": ("starter", "open_water.csv", shifted("KT"), "open_water", "warning", ""),
+    "advance in knots": ("starter", "open_water.csv", times("J", 1.943844), "open_water", "error", "actuator disk"),
+    "advance of half": ("starter", "open_water.csv", times("J", 0.5), "open_water", "warning", "over a unit of J"),
+    "no exclude": ("suboff", "stand_in_propeller.csv", emptied("exclude"), "rows", "warning", "exclude nothing"),
+    "another part": ("starter", "drift_vertical.csv", put("part", 3, "rudders"), "rows", "warning", "rudders"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("slip", SLIPS)
+def test_a_slip_in_one_load_is_named(place, slip):
+    boat, name, change, check, severity, words = SLIPS[slip]
+    path = place(boat) / name
+    table = pd.read_csv(path, dtype=str, keep_default_na=False)
+    change(table)
+    table.to_csv(path, index=False)
+    named = [(s, what) for c, s, what in found(path.parent) if c == check]
+    assert any(s == severity and words in what for s, what in named), named
+
+
+def test_a_row_cut_short_with_the_file_is_refused(place):
+    path = place("suboff") / "by_axisymmetry.csv"
+    text = path.read_text("utf-8").rstrip("\n")
+    path.write_text(text, "utf-8")
+    assert read_campaign(path.parent)
+    path.write_text(text[: text.rindex(",")], "utf-8")
+    with pytest.raises(InputError, match=r"by_axisymmetry\.csv, row 3: 7 cells and no line end.*cut short"):
+        read_campaign(path.parent)
+
+
+def test_the_rows_name_coefficients_that_are_there():
+    known = {t.name for s in SETS for t in terms(s)}
+    for row in proportions():
+        assert set(row.names) <= known
+        parts = {p for over in row.over for p in re.split(r"[+\-*]", over) if p}
+        assert parts <= known | {"mass", "diameter"}
+        assert set(row.sets) <= set(SETS)
+        assert row.low < row.high
+        assert row.severity in ("warning", "error")
+        assert len(row.basis) > 10
+
+
+def test_a_quotient_is_judged_beyond_its_errors():
+    row = Proportion(("a",), ("b",), 0.1, 1.0, "warning", (), False, "made")
+    limits = {"errors": 3.0, "gross": 3.0}
+    for value_, expected in ((0.5, ""), (1.5, "warning"), (4.0, "error"), (-0.5, "warning"), (0.01, "error")):
+        assert beyond(row, (value_, 0.0), (1.0, 0.0), limits) == expected, value_
+    assert beyond(row, (1.5, 0.3), (1.0, 0.0), limits) == ""
+    assert beyond(row, (1.5, 0.0), (1.0, 0.4), limits) == ""
+    assert evaluated("a-b*c", {"a": (1.0, 0.3), "b": (2.0, 0.2), "c": (3.0, 0.0)}) == (
+        pytest.approx(-5.0), pytest.approx(np.hypot(0.3, 0.6)))  # fmt: skip
+    assert evaluated("a+d", {"a": (1.0, 0.0)}) is None
+
+
+def test_an_actuator_disk_without_load_loses_nothing():
+    """Momentum theory: eta = 1 without thrust, and the propulsive power 2/(1 + sqrt(1 + C_T)) of C_T = 8: one half."""
+    advance = np.array([1.0, 1.0])
+    assert ideal_efficiency(advance, np.array([0.0, np.pi])) == pytest.approx([1.0, 0.5])
