@@ -236,8 +236,9 @@ def loads_a_boat_needs(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
 @check("essential")
 def damping_of_turns(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
     """Turns of the hull about an axis, none of whose runs gives the moment that opposes them."""
-    for file, group in evidence.runs.groupby("file", sort=False):
-        turning = group[group["test"].isin(["rotating_arm", "pure_rotation"]) & group["part"].isin(["hull", ""])]
+    runs = evidence.runs
+    turns = runs[runs["test"].isin(["rotating_arm", "pure_rotation"]) & runs["part"].isin(["hull", ""])]
+    for file, turning in turns.groupby("file", sort=False):
         for rate, moment in (("p", "K"), ("q", "M"), ("r", "N")):
             others = [r for r in "pqr" if r != rate]
             about = turning[(turning[rate].fillna(0.0) != 0.0) & (turning[others].fillna(0.0) == 0.0).all(axis=1)]
