@@ -105,6 +105,7 @@ def shifted(column: str):
     return change
 
 
+SHIP = "propeller_and_rudder.csv"
 SLIPS = {
     "roll damping in N mm": ("starter", "arm_p.csv", times("K_Nm", 1e3), "proportion", "error", "K_up"),
     "ten times the force by pitch": ("starter", "arm_q.csv", times("Z_N", 10.0), "proportion", "warning", "Z_uq"),
@@ -114,6 +115,9 @@ SLIPS = {
     "one of a table's sign": ("nps-auv2", "published.csv", value("X_vr", -1.0), "proportion", "error", "X_vr"),
     "another row's value": ("remus100", "published.csv", value("M_vp", 48.7), "proportion", "error", "M_vp"),
     "a lever of the other end": ("remus100", "published.csv", value("Z_uqf", -1.0), "proportion", "error", "Z_uqf"),
+    "thrust over rpm": ("remus100", "published.csv", value("X_nn", 100.0), "proportion", "error", "X_nn"),
+    "a rudder in degrees": ("kvlcc2", SHIP, value("f_alpha", 0.25), "proportion", "warning", "f_alpha"),
+    "a polynomial's sign": ("kvlcc2", SHIP, value("k_2", -1.0), "open_water", "error", "no end"),
     "degrees for a rate": ("bb2", "estimates.csv", renamed("p_radps", "p_degps"), "proportion", "error", "K_up"),
     "a thrust deduction of the other sign": (
         "bb2", "self_propulsion.csv", times("t", -1.0, slice(3)), "coefficient", "error", "t (propeller)"),
@@ -152,11 +156,11 @@ def test_a_row_cut_short_with_the_file_is_refused(place):
 
 
 def test_the_rows_name_coefficients_that_are_there():
-    known = {t.name for s in SETS for t in terms(s)}
+    known, own = {t.name for s in SETS for t in terms(s)}, {"mass", "diameter", "propeller", "rudder_aspect"}
     for row in proportions():
-        assert set(row.names) <= known
+        assert set(row.names) <= known | own
         parts = {p for over in row.over for p in re.split(r"[+\-*]", over) if p}
-        assert parts <= known | {"mass", "diameter"}
+        assert parts <= known | own
         assert set(row.sets) <= set(SETS)
         assert row.low < row.high
         assert row.severity in ("warning", "error")
@@ -179,3 +183,13 @@ def test_an_actuator_disk_without_load_loses_nothing():
     """Momentum theory: eta = 1 without thrust, and the propulsive power 2/(1 + sqrt(1 + C_T)) of C_T = 8: one half."""
     advance = np.array([1.0, 1.0])
     assert ideal_efficiency(advance, np.array([0.0, np.pi])) == pytest.approx([1.0, 0.5])
+
+
+def test_a_propeller_of_another_boat_is_named_where_it_stands(place):
+    path = place("starter").parent / "my-boat.toml"
+    text = path.read_text("utf-8")
+    assert "value = 3.6, unit" in text
+    path.write_text(text.replace("value = 3.6, unit", "value = 12.0, unit"), "utf-8")
+    folder = path.parent / "captive"
+    (one,) = [f for f in check_campaign(read_campaign(folder), folder) if "propeller = 0.2" in f.what]
+    assert (one.check, one.severity, one.file) == ("proportion", "warning", "vehicle my-boat")

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ident.checks.findings import Array, Evidence, Finding, Rule, check, kept, rows_of, together
+from ident.checks.findings import Array, Evidence, Finding, Rule, check, kept, printed_place, rows_of, together
 from sim.boat.parts import vehicle_terms
 
 
@@ -68,6 +68,28 @@ def thrust_over_advance(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
             what = f"KT falls by {-slope:.3g} over a unit of J, propellers have {limits['slope_low']:g} to "
             what += f"{limits['slope_high']:g}: the unit of J, or KT of another row?"
             yield rule.finding(str(file), rows_of(group), ["J", "KT"], what, "warning")
+
+
+@check("open_water")
+def published_thrust_over_advance(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
+    """KT = k_0 + k_1 J + k_2 J^2 as published: it comes to zero, and falls as much as of other propellers till then."""
+    table, limits = evidence.constants, rule.limits
+    if table is None:
+        return
+    known = {str(n): float(v) for n, v in zip(table["coefficient"], table["value"], strict=True)}
+    names = ["k_0", "k_1", "k_2"]
+    if not all(n in known for n in names):
+        return
+    roots = np.roots([known[n] for n in reversed(names)])
+    ends = [float(r.real) for r in roots if abs(r.imag) < 1e-9 and r.real > 0.0]
+    slope = known["k_0"] / min(ends) if ends else math.nan
+    if limits["slope_low"] <= slope <= limits["slope_high"]:
+        return
+    of = ", ".join(f"{n} = {known[n]:g}" for n in names)
+    what = f"{of}: KT falls by {slope:.3g} over a unit of J, propellers have {limits['slope_low']:g} to "
+    what += f"{limits['slope_high']:g}"
+    what = what if ends else f"{of}: a thrust with no end, however fast the propeller advances"
+    yield rule.finding(*printed_place(evidence.runs, names), ["value"], what, "warning" if ends else "")
 
 
 @check("side_force")

@@ -28,6 +28,12 @@ _SLOPES = (
 )
 
 
+# Sizes of the boat among what is known, as parts of its length.
+_SIZES = ("mass", "diameter", "propeller", "rudder_aspect")
+# Norms of what is without a dimension.
+_PRIME = ("rho/2 L", "")
+
+
 @dataclass(frozen=True)
 class Proportion:
     """One row of ``data/coefficient_proportions.csv``.
@@ -35,8 +41,8 @@ class Proportion:
     Attributes
     ----------
     names : Coefficients of which the first known is judged.
-    over : What it is divided by: sums and products of coefficients and of the boat's ``mass`` and ``diameter``,
-        of which the first known is taken.
+    over : What it is divided by: sums and products of coefficients and of the boat's ``mass``, ``diameter``,
+        ``propeller`` (its diameter) and ``rudder_aspect``, of which the first known is taken.
     low, high : Between which the quotient is.
     severity : Of a finding.
     sets : Term sets whose terms of that name are meant; all where there is none.
@@ -115,12 +121,16 @@ def _known(evidence: Evidence) -> dict[str, tuple[float, float]]:
     if body.mass is not None:
         known["mass"] = body.mass / (0.5 * body.density * body.length**3), 0.0
         known["diameter"] = spheroid_diameter(body) / body.length, 0.0
+    if vehicle.propeller is not None:
+        known["propeller"] = vehicle.diameter / body.length, 0.0
+    if vehicle.rudder is not None:
+        known["rudder_aspect"] = float(vehicle.rudder.height.value) ** 2 / float(vehicle.rudder.area.value), 0.0
     norms = {t.name: t.norm for t in vehicle_terms(vehicle)}
     if vehicle.terms_of.tabulated:
         known |= _of_runs(evidence)
     # Of a table the largest value.
     for table in (evidence.tabulated, evidence.constants):
-        of_norm = table[table["coefficient"].map(norms) == "rho/2 L"] if table is not None and len(table) else None
+        of_norm = table[table["coefficient"].map(norms).isin(_PRIME)] if table is not None and len(table) else None
         if of_norm is not None:
             of_norm = of_norm.sort_values("value", key=np.abs)
             rows = zip(of_norm["coefficient"], of_norm["value"], of_norm["stderr"], strict=True)
@@ -141,6 +151,7 @@ def coefficients_beside_each_other(evidence: Evidence, rule: Rule) -> Iterator[F
         name = next((n for n in row.names if n in known), "")
         over = next((o for o in row.over if evaluated(o, known) is not None), "")
         place = printed_place(evidence.runs, [name]) if name else ("", [])
+        place = (evidence.body.file, []) if name in _SIZES else place
         if not name or not over or (row.printed and not place[1]):
             continue
         severity = beyond(row, known[name], evaluated(over, known) or (0.0, 0.0), rule.limits)
