@@ -48,7 +48,7 @@ def only(evidence, names, change):
     runs = evidence.runs.copy()
     change(runs)
     campaign = replace(evidence.campaign, runs=runs)
-    altered = replace(evidence, runs=runs, campaign=campaign, memo={})
+    altered = replace(evidence, runs=runs, campaign=campaign)
     return [f for name in names for function in registered()[name] for f in function(altered, rules()[name])]
 
 
@@ -212,7 +212,7 @@ def test_side_force_without_drift_and_mirror_images(evidence):
 
 
 def test_a_campaign_of_another_length(evidence):
-    other = replace(evidence, tested_length=evidence.tested_length * 1.02, memo={})
+    other = replace(evidence, tested_length=evidence.tested_length * 1.02)
     (found,) = [f for function in registered()["scale"] for f in function(other, rules()["scale"])]
     assert found.severity == "error"
 
@@ -228,7 +228,7 @@ def test_no_number_stops_the_checks(evidence, data):
     for _ in range(data.draw(st.integers(1, 12))):
         row = data.draw(st.integers(0, len(runs) - 1))
         runs.loc[row, data.draw(st.sampled_from(columns))] = data.draw(odd)
-    altered = replace(evidence, runs=runs, campaign=replace(evidence.campaign, runs=runs), memo={})
+    altered = replace(evidence, runs=runs, campaign=replace(evidence.campaign, runs=runs))
     assert all(f.what and f.remedy and f.file for f in findings_of(altered))
 
 

@@ -46,11 +46,17 @@ def sigma(measured: str) -> str:
     return f"s_{measured}"
 
 
+def excludes(runs: pd.DataFrame, measured: str) -> bool:
+    """Whether column ``exclude`` of any run names a load or coefficient."""
+    return any(measured in text.split() for text in runs["exclude"].unique())
+
+
 def excluded(runs: pd.DataFrame, measured: str) -> pd.Series:
     """True for runs whose column ``exclude`` names a load or coefficient."""
+    if not excludes(runs, measured):
+        return pd.Series(False, index=runs.index)
     texts = runs["exclude"]
-    named = {text: measured in text.split() for text in texts.unique()}
-    return texts.map(named).astype(bool) if any(named.values()) else pd.Series(False, index=runs.index)
+    return texts.map({text: measured in text.split() for text in texts.unique()}).astype(bool)
 
 
 def run_table(columns: Mapping[str, Any]) -> pd.DataFrame:

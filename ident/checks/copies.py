@@ -187,31 +187,46 @@ def frozen_column(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
     runs = _independent(evidence.runs).copy()
     odd = [c for c in STATES if c in ("beta", "plane") or c in MIRRORED_FACTORS]
     runs[odd] = runs[odd].abs()
-    states, whole = state_key(runs), load_key(runs, rule)
-    by_file: dict[tuple[str, str, bool], list[pd.DataFrame]] = {}
-    for output in OUTPUTS:
-        count = pd.Series(digits(runs[output].to_numpy(float)), index=runs.index)
-        usable = runs[kept(runs, output) & (count >= rule.limits["digits"])]
-        key = _hashed(pd.DataFrame({"test": usable["test"], "value": _rounded(usable[output].to_numpy(float))}))
-        tests = count[usable.index].groupby(usable["test"]).agg(["size", "max"])
-        least = {t: _beyond_chance(int(n), int(d), rule.limits["chance"]) for t, n, d in tests.itertuples()}
-        # Without any run, pandas takes the map of texts for a column of texts.
-        many = key.groupby(key).transform("size") >= usable["test"].map(least).astype(float)
-        for _, group in _again(usable[many], key[many]):
-            others = group[[o for o in OUTPUTS if o != output]].notna().any(axis=None)
-            same = others and whole[group.index].nunique() == 1
-            if states[group.index].nunique() < 2 or same:
+    states, whole = state_key(runs).to_numpy(), load_key(runs, rule).to_numpy()
+    given, known = runs[list(OUTPUTS)].notna().to_numpy(), declared(evidence, runs).to_numpy()
+    files, rows = runs["file"].to_numpy(object), runs["row"].to_numpy()
+    # File, what varies, whether the campaign says so -> rows and the load of each group.
+    found: dict[tuple[str, str, bool], list[tuple[Array, str]]] = {}
+    for column, output in enumerate(OUTPUTS):
+        for group in _alike(runs, output, rule):
+            others = np.delete(given[group], column, axis=1).any()
+            same = others and len(np.unique(whole[group])) == 1
+            if len(np.unique(states[group])) < 2 or same:
                 continue
-            known = bool((~declared(evidence, group)).sum() <= 1)
-            for file, of_file in group.groupby("file", sort=False):
-                by_file.setdefault((str(file), _axes(group), known), []).append(of_file.assign(output=output))
-    for (file, varies, known), groups in by_file.items():
-        table = pd.concat(groups)
-        columns = list(dict.fromkeys(table["output"]))
+            varies, trusted_less = _axes(runs.iloc[group]), int((~known[group]).sum()) <= 1
+            for file in dict.fromkeys(files[group]):
+                here = rows[group[files[group] == file]]
+                found.setdefault((str(file), varies, trusted_less), []).append((here, output))
+    for (file, varies, trusted_less), groups in found.items():
+        places, columns = np.concatenate([r for r, _ in groups]), list(dict.fromkeys(output for _, output in groups))
         what = f"the same to the last digit whatever {varies}: {len(groups)} values of {', '.join(columns)} "
-        yield rule.finding(
-            file, table["row"], columns, what + f"stand in {table['row'].nunique()} runs", milder(rule, known)
-        )
+        what += f"stand in {len(np.unique(places))} runs"
+        yield rule.finding(file, places, columns, what, milder(rule, trusted_less))
+
+
+def _alike(runs: pd.DataFrame, output: str, rule: Rule) -> list[NDArray[np.int64]]:
+    """Places of runs of one test with the same value of a load, in groups too large for chance, as they come."""
+    count = digits(runs[output].to_numpy(float))
+    usable = np.flatnonzero(kept(runs, output).to_numpy() & (count >= rule.limits["digits"]))
+    if not usable.size:
+        return []
+    test, which = np.unique(runs["test"].to_numpy(object)[usable], return_inverse=True)
+    shown = np.zeros(len(test), dtype=int)
+    np.maximum.at(shown, which, count[usable])
+    of_test = np.bincount(which)
+    least = [_beyond_chance(int(n), int(d), rule.limits["chance"]) for n, d in zip(of_test, shown, strict=True)]
+    value = _rounded(runs[output].to_numpy(float)[usable])
+    _, key, size = np.unique(np.stack([which, value]), axis=1, return_inverse=True, return_counts=True)
+    many = (size[key] > 1) & (size[key] >= np.array(least)[which])
+    groups: dict[int, list[int]] = {}
+    for place, number in zip(usable[many].tolist(), key[many].tolist(), strict=True):
+        groups.setdefault(number, []).append(place)
+    return [np.array(group) for group in groups.values()]
 
 
 def _beyond_chance(count: int, shown: int, chance: float) -> int:
@@ -233,5 +248,8 @@ def _beyond_chance(count: int, shown: int, chance: float) -> int:
 
 def _axes(group: pd.DataFrame) -> str:
     """Names of the states that differ within a group."""
-    names = [c for c in STATES if group[c].dropna().nunique() > 1]
+    values = group[list(STATES)].to_numpy(float)
+    names = [
+        c for c, low, high in zip(STATES, np.fmin.reduce(values), np.fmax.reduce(values), strict=True) if low < high
+    ]
     return ", ".join(names + (["part"] if group["part"].nunique() > 1 else []))

@@ -14,7 +14,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from ident.captive.run_table import excluded, run_table
+from ident.captive.run_table import excluded, excludes, run_table
 
 if TYPE_CHECKING:
     from ident.captive.campaign import Campaign
@@ -187,7 +187,7 @@ class Evidence:
     tested_length: float | None = None
     between: Sequence[Any] = ()
     folder: Path | None = None
-    memo: dict[str, pd.DataFrame] = field(default_factory=dict, repr=False)
+    memo: dict[str, Any] = field(default_factory=dict, init=False, repr=False)
 
 
 Function = Callable[[Evidence, Rule], Iterable[Finding]]
@@ -246,7 +246,8 @@ def prime(runs: pd.DataFrame, output: str, body: Body) -> pd.Series:
 
 def kept(runs: pd.DataFrame, output: str) -> pd.Series:
     """True where a load is given and not excluded by the campaign."""
-    return runs[output].notna() & ~excluded(runs, output)
+    given = runs[output].notna()
+    return given & ~excluded(runs, output) if excludes(runs, output) else given
 
 
 def factors(evidence: Evidence, runs: pd.DataFrame) -> pd.Series:

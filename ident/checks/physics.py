@@ -193,7 +193,12 @@ def apparent_inertia(evidence: Evidence) -> Iterator[tuple[str, str, pd.DataFram
     accelerations, with every run of its file accelerated along one axis only. What the two sides of an
     oscillation have in common is no load of the acceleration, nor is the resistance of a boat with way on.
     """
-    runs = evidence.runs
+    if "apparent inertia" not in evidence.memo:
+        evidence.memo["apparent inertia"] = list(_apparent_inertia(evidence.runs))
+    yield from evidence.memo["apparent inertia"]
+
+
+def _apparent_inertia(runs: pd.DataFrame) -> Iterator[tuple[str, str, pd.DataFrame, float]]:
     moving = runs[list(ACCELERATIONS)].fillna(0.0) != 0.0
     for acceleration, output in _ANSWERS.items():
         alone = runs[moving[acceleration] & (moving.sum(axis=1) == 1) & kept(runs, output)]

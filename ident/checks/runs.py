@@ -258,13 +258,16 @@ def deviations(evidence: Evidence, every: list[Series]) -> pd.DataFrame:
     """
     pieces: dict[str, list[Array]] = {name: [] for name in ("point", "owner", "at", "load", "fit", "noise")}
     places: list[tuple[int, str, str, int]] = []
+    # Many series are of the same places, and many loads of the same runs.
+    fits: dict[tuple[bytes, bytes, bytes], Fits] = {}
     for number, series in enumerate(every):
         stencil = hash(tuple(np.sort(series.at).round(6)))
-        given, fits = np.isfinite(series.loads), {}
+        given, owners = np.isfinite(series.loads), np.unique(series.owner, return_inverse=True)[1]
         for output, values, known in zip(OUTPUTS, series.loads.T, given.T, strict=True):
-            if known.tobytes() not in fits:
-                fits[known.tobytes()] = series.local_fits(known)
-            local = fits[known.tobytes()]
+            key = (series.at.tobytes(), owners.tobytes(), known.tobytes())
+            if key not in fits:
+                fits[key] = series.local_fits(known)
+            local = fits[key]
             point = np.flatnonzero(np.isfinite(local.noise))
             columns = (point, series.owner[point], series.at[point].round(6), values[point], local.at(values)[point])
             for column, piece in zip(pieces.values(), (*columns, local.noise[point]), strict=True):

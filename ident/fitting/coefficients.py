@@ -6,6 +6,8 @@ from collections import Counter
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 if TYPE_CHECKING:
     import pandas as pd
 
@@ -38,20 +40,30 @@ class CoefficientSummary:
 
 def coefficient_summaries(rows: pd.DataFrame) -> list[CoefficientSummary]:
     """One entry a coefficient of database rows, in their order."""
-    return [_summary(str(name), group) for name, group in rows.groupby("coefficient", sort=False)]
-
-
-def _summary(name: str, group: pd.DataFrame) -> CoefficientSummary:
-    from_runs = group[group["origin"].isin(["measured", "published"])]
-    counted = from_runs if not from_runs.empty else group
-    counted = counted[counted["value"] != 0.0]
-    return CoefficientSummary(
-        coefficient=name,
-        points=len(group),
-        measured=len(from_runs),
-        runs=len({r for text in group["runs"] for r in text.split()}),
-        estimated=int(group["estimated_by"].ne("").sum()),
-        median_relative_error=None if counted.empty else float((counted["stderr"] / counted["value"].abs()).median()),
-        worst_residual=float(group["worst_residual"].max()),
-        quality=dict(Counter(q for q in counted["quality"] if q)),
-    )
+    # By arrays: taking a group of a table costs more than all that is asked of it.
+    of_runs = rows["origin"].isin(["measured", "published"]).to_numpy(dtype=bool)
+    estimated = rows["estimated_by"].ne("").to_numpy(dtype=bool)
+    value, stderr, worst = (rows[c].to_numpy(dtype=float) for c in ("value", "stderr", "worst_residual"))
+    runs, quality = rows["runs"].to_numpy(object), rows["quality"].to_numpy(object)
+    places: dict[str, list[int]] = {}
+    for place, name in enumerate(rows["coefficient"].tolist()):
+        places.setdefault(name, []).append(place)
+    summaries = []
+    for name, found in places.items():
+        group = np.array(found)
+        counted = group[of_runs[group]] if of_runs[group].any() else group
+        counted = counted[value[counted] != 0.0]
+        relative = stderr[counted] / np.abs(value[counted])
+        summaries.append(
+            CoefficientSummary(
+                coefficient=name,
+                points=len(group),
+                measured=int(of_runs[group].sum()),
+                runs=len({r for text in set(runs[group]) for r in text.split()}),
+                estimated=int(estimated[group].sum()),
+                median_relative_error=float(np.nanmedian(relative)) if counted.size else None,
+                worst_residual=float(np.fmax.reduce(worst[group])),
+                quality=dict(Counter(q for q in quality[counted] if q)),
+            )
+        )
+    return summaries

@@ -151,8 +151,10 @@ class Runs:
         """The first run of each of some states, as number of the state and column -> value."""
         for at in range(0, len(states), _CHUNK):
             chunk = states[at : at + _CHUNK]
-            rows = self.table.iloc[self.first[chunk]].to_dict("records")
-            yield from zip(chunk.tolist(), ({str(k): v for k, v in row.items()} for row in rows), strict=True)
+            table = self.table.iloc[self.first[chunk]]
+            columns = {str(name): table[name].tolist() for name in table}
+            rows = (dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True))
+            yield from zip(chunk.tolist(), rows, strict=True)
 
     def origins(self) -> Indices:
         """(runs,) number of the run that each is a copy of, or its own."""
