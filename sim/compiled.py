@@ -9,10 +9,11 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
-from numba import njit
+from numba import njit, typeof
 from numba.core.caching import CompileResultCacheImpl, FunctionCache, IndexDataCacheFile
+from numba.core.registry import cpu_target
 
-from sim.compiled_cache import cache_place, is_ours
+from sim.compiled_cache import cache_place, end_turn, is_ours, take_turn
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -24,8 +25,8 @@ _INSIDE: dict[str, Any] = {"no_cpython_wrapper": True, **_UNCOUNTED}
 CHOSEN: Any = {**_OPTIONS, **_INSIDE}
 CHOSEN_INLINED: Any = {**CHOSEN, "forceinline": True}
 _PACKAGE = Path(__file__).resolve().parent
-# Time to compile the right-hand side and the loop around it [s], said beforehand.
-_CALM, _WAVES = 20, 40
+# Time to compile the right-hand side and the loop around it [s], said beforehand; in waves so much more.
+_CALM, _WAVES = 10, 10
 
 
 class _Locator:
@@ -84,22 +85,49 @@ class _Cache(FunctionCache):
 
     def __init__(self, function: Callable[..., Any]) -> None:
         super().__init__(function)
+        self._place = Path(self._cache_path)
         self._cache_file = _Files(self._cache_path, self._impl.filename_base, self._impl.locator.get_source_stamp())
 
-    def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """A kept function; a damaged file is thrown away, and compiled again."""
+    def holds(self, sig: Any, target_context: Any) -> bool:
+        """Whether a function is kept for types of arguments, without reading it."""
         try:
-            kept = super().load_overload(sig, target_context)
+            return self._index_key(sig, target_context.codegen()) in self._cache_file._load_index()
         except Exception:
-            # Truncated, foreign or unreadable: whatever a damaged pickle raises.
-            self._throw_away()
-            kept = None
+            # As for ``load_overload``.
+            return False
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """A kept function, or one that another process is compiling now; None when it is for this one to compile."""
+        kept = self._read(sig, target_context)
         if kept is None:
-            _announce(self._py_func, sig, "once per installation")
+            _announce(self._py_func, sig, _ONCE)
+            take_turn(self._place, self._turn(sig))
+            kept = self._read(sig, target_context)
+            if kept is not None:
+                end_turn(self._place, self._turn(sig))
         return kept
 
     def save_overload(self, sig: Any, data: Any) -> None:
         """Keep a function; without room for it nothing is kept."""
+        # The index of a function is read, added to and written again.
+        take_turn(self._place, self._impl.filename_base)
+        self._write(sig, data)
+        end_turn(self._place, self._impl.filename_base)
+        end_turn(self._place, self._turn(sig))
+
+    def _turn(self, sig: Any) -> str:
+        return f"{self._impl.filename_base} {sig}"
+
+    def _read(self, sig: Any, target_context: Any) -> Any:
+        """A kept function; a damaged file is thrown away."""
+        try:
+            return super().load_overload(sig, target_context)
+        except Exception:
+            # Truncated, foreign or unreadable: whatever a damaged pickle raises.
+            self._throw_away()
+            return None
+
+    def _write(self, sig: Any, data: Any) -> None:
         try:
             super().save_overload(sig, data)
         except OSError:
@@ -111,7 +139,7 @@ class _Cache(FunctionCache):
                 super().save_overload(sig, data)
 
     def _throw_away(self) -> None:
-        for path in Path(self._cache_path).glob(f"{self._impl.filename_base}.*"):
+        for path in self._place.glob(f"{self._impl.filename_base}.*"):
             with contextlib.suppress(OSError):
                 path.unlink()
 
@@ -123,6 +151,10 @@ class _NoCache:
 
     def __init__(self, function: Callable[..., Any]) -> None:
         self._function = function
+
+    def holds(self, sig: Any, target_context: Any) -> bool:
+        # What another process compiles could not be read.
+        return True
 
     def load_overload(self, sig: Any, target_context: Any) -> None:
         _announce(self._function, sig, "at every start, as no folder of your own can keep it")
@@ -159,19 +191,34 @@ class _LazyCache:
         return getattr(self._made, name)
 
 
-_LOOPS = {"run": "a flight", "hold": "a flight", "fill_rate": "the right-hand side", "step": "the right-hand side"}
+_LOOPS = {"integrate", "hold", "fill_rate", "step"}
+_ONCE = "once per installation"
 _said: set[str] = set()
 _log = logging.getLogger(__name__)
 
 
-def _announce(function: Callable[..., Any], sig: Any, how_often: str) -> None:
-    """Say what takes so long, once a process for each of calm water and waves."""
-    waves = "Surroundings" in str(sig)
-    where = "in waves" if waves else "in calm water"
-    if function.__name__ in _LOOPS and where not in _said:
-        _said.add(where)
-        seconds = _WAVES if waves else _CALM
+def announce(in_waves: bool, how_often: str = _ONCE) -> None:
+    """Say what takes so long, once a process for each of calm water and waves; whoever begins with waves needs both."""
+    where = "in waves" if in_waves else "in calm water"
+    if where not in _said:
+        seconds = (_WAVES if in_waves else 0) + (0 if "in calm water" in _said else _CALM)
+        _said.update({where, "in calm water"})
         _log.warning("compiling the right-hand side %s, %s, about %s s", where, how_often, seconds)
+
+
+def _announce(function: Callable[..., Any], sig: Any, how_often: str) -> None:
+    if function.__name__ in _LOOPS:
+        announce("Surroundings" in str(sig), how_often)
+
+
+def is_kept(function: Any, *arguments: Any) -> bool:
+    """Whether a compiled function is kept for the types of the arguments, or nothing can be; it is not read."""
+    return bool(function._cache.holds(tuple(map(typeof, arguments)), cpu_target.target_context))
+
+
+def compile_for(function: Any, *arguments: Any) -> None:
+    """Compile a function for the types of the arguments, and keep it, without calling it."""
+    function.compile(tuple(map(typeof, arguments)))
 
 
 def outer(function: F) -> F:

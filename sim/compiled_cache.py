@@ -7,19 +7,29 @@ and every upgrade, compile afresh, and serves every copy of the same sources.
 
 What lies there is run. It is believed only when it belongs to the user and nobody else could have
 written it. Nothing heavy is imported here.
+
+Processes that compile at the same time take turns: each function is compiled by one of them and read by the
+others. Where a system has no locks of records, each compiles what it needs.
 """
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import logging
 import os
 import re
 import stat
 import time
+import zlib
 from collections.abc import Iterator
 from functools import lru_cache
 from pathlib import Path
+
+try:
+    import fcntl
+except ImportError:  # pragma: no cover
+    fcntl = None  # type: ignore[assignment]
 
 VARIABLE = "NUMBA_CACHE_DIR"
 PREFIX = "ident-compiled-"
@@ -28,6 +38,8 @@ _log = logging.getLogger(__name__)
 # Folders that stay whatever their age, and the age [s] below which any stays.
 _KEPT = 5
 _RECENT = 86400.0
+# One that has its turn longer is not waited for: it may have been stopped. How often it is looked for [s].
+_PATIENCE, _LOOK = 60.0, 0.01
 _IMPORTS = re.compile(r"^(?:from|import) sim((?:\.\w+)+)(?: import (\([^)]*\)|[^\n]*))?", re.MULTILINE)
 _MARKS = ("cache=True", "from sim.compiled import")
 
@@ -146,3 +158,40 @@ def cache_place(folder: Path) -> Path | None:
         return None
     remove_stale(parent)
     return parent / name
+
+
+@lru_cache(maxsize=8)
+def _turns(place: Path) -> int:
+    """What turns are taken in. Open to the end of the process: with it closed, all of its turns would be over."""
+    return os.open(place / "turns", os.O_RDWR | os.O_CREAT, 0o600)
+
+
+def take_turn(place: Path, name: str) -> None:
+    """Wait until no other process has the turn of a name, and take it; a process that ends has given it back.
+
+    After a minute, and where there are no locks, it returns without.
+
+    Parameters
+    ----------
+    place : From ``cache_place``.
+    name : Of what one process at a time shall do.
+    """
+    if fcntl is None:
+        return
+    end = time.monotonic() + _PATIENCE
+    with contextlib.suppress(OSError):
+        turns = _turns(place)
+        while time.monotonic() < end:
+            try:
+                fcntl.lockf(turns, fcntl.LOCK_EX | fcntl.LOCK_NB, 1, zlib.crc32(name.encode()))
+            except (BlockingIOError, PermissionError):
+                time.sleep(_LOOK)
+            else:
+                return
+
+
+def end_turn(place: Path, name: str) -> None:
+    """Let the next process have its turn."""
+    if fcntl is not None:
+        with contextlib.suppress(OSError):
+            fcntl.lockf(_turns(place), fcntl.LOCK_UN, 1, zlib.crc32(name.encode()))

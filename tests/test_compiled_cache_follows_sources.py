@@ -21,9 +21,11 @@ from sim.compiled_cache import (
     VARIABLE,
     cache_place,
     compiled_sources,
+    end_turn,
     is_ours,
     remove_stale,
     sources_key,
+    take_turn,
 )
 from sim.flight.maneuver import integrate as run_flight
 
@@ -83,19 +85,44 @@ def compiled(once_compiled, tmp_path):
     return tmp_path / "copy" / "sim"
 
 
-def run(folder: Path, home: Path | None = None) -> tuple[list[str], str]:
-    """What a fresh process prints with this package, its home a folder of its own; and on stderr."""
+# Says that it has compiled something, and keeps it when it is told to.
+WAITING = f"""
+import sys
+from sim.compiled import _Cache
+
+keep = _Cache._write
+
+def told(*of_a_function):
+    print("compiled", flush=True)
+    sys.stdin.readline()
+    keep(*of_a_function)
+
+_Cache._write = told
+{PROGRAM}
+"""
+
+
+def begun(folder: Path, home: Path | None = None, program: str = PROGRAM) -> subprocess.Popen[str]:
+    """A fresh process with this package, its home a folder of its own."""
     clean = {k: v for k, v in os.environ.items() if k not in (VARIABLE, "XDG_CACHE_HOME", "LOCALAPPDATA")}
     place = str(home or folder.parent / "home")
-    done = subprocess.run(
-        [sys.executable, "-B", "-c", PROGRAM],
+    return subprocess.Popen(
+        [sys.executable, "-B", "-c", program],
         cwd=folder.parent,
         env={**clean, "HOME": place, "LOCALAPPDATA": place},
-        capture_output=True,
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
         text=True,
-        check=True,
     )
-    return done.stdout.split(), done.stderr
+
+
+def run(folder: Path, home: Path | None = None) -> tuple[list[str], str]:
+    """What a fresh process prints, and on stderr."""
+    with begun(folder, home) as process:
+        printed, said = process.communicate()
+    assert process.returncode == 0, said
+    return printed.split(), said
 
 
 def _kept(folder: Path) -> list[Path]:
@@ -114,6 +141,38 @@ def test_an_edit_of_inlined_code_is_seen_and_a_copy_elsewhere_does_not_compile_a
     assert run(other, tmp_path / "home") == (["1.0", "1"], "")
     (package / "inner.py").write_text(INNER.replace("FACTOR", "3.0"), "utf-8")
     assert run(package)[0] == ["1.5", "0"]
+
+
+@pytest.mark.skipif(os.name != "posix", reason="locks of POSIX")
+@pytest.mark.parametrize(("ends", "read"), [(False, "1"), (True, "0")])
+def test_what_another_process_compiles_is_waited_for_and_read_unless_that_ends(package, ends, read):
+    with begun(package, program=WAITING) as first:
+        assert first.stdout.readline() == "compiled\n"
+        with begun(package) as second:
+            assert second.stderr.readline().startswith("compiling")
+            # It has looked and not found; without turns it would compile from here on.
+            time.sleep(1.0)
+            assert second.poll() is None
+            first.kill() if ends else first.stdin.write("\n\n")
+            first.stdin.close() if ends else first.stdin.flush()
+            assert second.communicate(timeout=60)[0].split() == ["1.0", read]
+
+
+def test_a_turn_is_not_waited_for_without_end(package, home, monkeypatch):
+    place = cache_place(package)
+    monkeypatch.setattr("sim.compiled_cache._PATIENCE", 0.2)
+    holder = "import sys; from pathlib import Path; from sim.compiled_cache import take_turn\n"
+    holder += f"take_turn(Path({str(place)!r}), 'it'); print('taken', flush=True); sys.stdin.readline()"
+    with begun(package, program=holder) as other:
+        assert other.stdout.readline() == "taken\n"
+        since = time.monotonic()
+        take_turn(place, "it")
+        assert time.monotonic() - since >= (0.2 if os.name == "posix" else 0.0)
+        since = time.monotonic()
+        take_turn(place, "another")
+        end_turn(place, "another")
+        assert time.monotonic() - since < 0.2
+        other.communicate("\n")
 
 
 def _truncate(path: Path) -> None:

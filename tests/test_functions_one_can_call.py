@@ -10,7 +10,7 @@ import pytest
 ROOT = Path(__file__).parents[1]
 FILES = sorted([*(ROOT / "ident").rglob("*.py"), *(ROOT / "sim").rglob("*.py")])
 # The options of a command are its parameters; compiled functions take flat arrays (docs/architecture.md).
-FREE = ("click.command", "njit", "compiled", "inner", "outer", "inlined", "fast", "intrinsic")
+FREE = ("click.command", "njit", "compiled", "inner", "outer", "making", "inlined", "merged", "fast", "intrinsic")
 
 
 def functions(path):

@@ -239,10 +239,11 @@ def _figures(asked: ValidateOptions) -> Iterator[Drawn]:
 
 def _one(asked: ValidateOptions, console: Any) -> Validation:
     import ident
+    from ident.validation.compiling import loop_of
     from ident.validation.tables import show
 
     assert asked.case is not None
-    with console.status("flying the case"):
+    with console.status("flying the case"), loop_of(asked.case):
         done = ident.validate(asked.case, asked.db, asked.version, without=asked.left_out, **asked.of_one_case())
     if asked.loads:
         from ident.validation.loads import check_parts
@@ -288,10 +289,11 @@ def _board_with_bands(board: Scoreboard, done: list[Validation], asked: Validate
 
 
 def _all(asked: ValidateOptions, console: Any) -> Scoreboard:
+    from ident.validation.compiling import loop_of
     from ident.validation.scoreboard import scoreboard
     from ident.validation.scoreboard_tables import show
 
-    with console.status("flying") as status:
+    with console.status("flying") as status, loop_of(None):
         board = scoreboard(
             asked.db,
             asked.version,

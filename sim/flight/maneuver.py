@@ -70,7 +70,8 @@ class Sample(NamedTuple):
 
 def sample_of(controls: int) -> Sample:
     """Scratch for so many controls."""
-    return Sample(*np.zeros((3, N_STATES)), np.zeros(controls))
+    read, change, trial = np.zeros((3, N_STATES))
+    return Sample(read, change, trial, np.zeros(controls))
 
 
 class Flight(NamedTuple):
@@ -135,7 +136,7 @@ def _past_check(g: np.ndarray, q: np.ndarray, y: np.ndarray, sense: float) -> fl
 
 
 @inlined
-def _past(g: np.ndarray, q: np.ndarray, f: np.ndarray, j: np.ndarray, y: np.ndarray, t: float) -> float:
+def past(g: np.ndarray, q: np.ndarray, f: np.ndarray, j: np.ndarray, y: np.ndarray, t: float) -> float:
     """Not negative once a zigzag check or an event of a programme has happened."""
     latest = _past_check(g, q, y, f[SENSE])
     if q[N_EVENTS]:
@@ -154,7 +155,7 @@ def _cross(v: Flight, near: Around, rate: np.ndarray, t: float, h: float, scheme
         step(v.m, v.w, v.y, v.c, rate, middle, near, v.s, v.k, v.stage, scheme, trial)
         if close:
             return high
-        if _past(v.g, v.q, v.f, v.j, trial, t + middle) >= 0.0:
+        if past(v.g, v.q, v.f, v.j, trial, t + middle) >= 0.0:
             high = middle
         else:
             low = middle
@@ -273,7 +274,7 @@ def integrate(
         while left > 0.0:
             now, part = start + sample * dt + (dt - left), left
             step(v.m, v.w, v.y, v.c, rate, left, near, v.s, v.k, v.stage, scheme, trial)
-            happens = (zigzag or programmed) and _past(v.g, v.q, v.f, v.j, trial, now + left) >= 0.0
+            happens = (zigzag or programmed) and past(v.g, v.q, v.f, v.j, trial, now + left) >= 0.0
             if happens:
                 part = _cross(v, near, rate, now, left, scheme, trial)
             for i in range(N_STATES):
