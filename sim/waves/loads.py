@@ -31,10 +31,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.boat.state import PHI, PSI, THETA, X, Y, Z
-from sim.compiled import inlined, outer
+from sim.compiled import inlined, inner, outer
 from sim.waves.linear import Waves
 from sim.waves.pressure import Quadrature, box_top, fill_rotation
-from sim.waves.sums import sum_few, sum_many
+from sim.waves.sums import LANES, fill_many, sum_few, sum_many
 
 Array = NDArray[np.float64]
 Single = NDArray[np.float32]
@@ -53,11 +53,10 @@ class Sea(NamedTuple):
     """Waves and the boat's points in them; shared by threads.
 
     waves : Components; a sea without components is calm and must not be evaluated.
-    single : (6, n) k, k cos chi, k sin chi, omega, cos chi, sin chi in single precision.
+    single : (6, n or a little more) k, k cos chi, k sin chi, omega, cos chi, sin chi in single precision.
     points : (v + s + p + 1 + e, 3) volume points, section centres, probes, the depth gauge,
         stations over which the elevation is wanted, in the body frame [m].
-    masses : (v,) rho V of the volume points [kg].
-    sections : (s, 3) c m in x, y, z of the sections [kg].
+    volumes : v. weights : (v + s, 3) in x, y, z: rho V of the volume points, c m of the sections [kg].
     compliance : (6, 6) inverse of the added mass; zero where there is none.
     stations : e. box : (2, 3) corners of a box around the boat [m]. crest : Highest elevation
         that can come [m].
@@ -67,8 +66,8 @@ class Sea(NamedTuple):
     waves: Waves
     single: Single
     points: Array
-    masses: Array
-    sections: Array
+    volumes: int
+    weights: Array
     compliance: Array
     stations: int
     box: Array
@@ -97,7 +96,8 @@ class Passage(NamedTuple):
     place: Array
     motion: Array
     sums: Array
-    body: Array
+    scratch: tuple[Array, Array, Array, Array]
+    gain: Array
     matrix: Array
 
 
@@ -183,13 +183,14 @@ def make_sea(
     over = np.column_stack([along, np.zeros((along.size, 2))])
     gauge = np.zeros((1, 3))
     k, w, a = waves.number, waves.frequency, waves.amplitude
-    single = np.stack([k, k * waves.north, k * waves.east, w, waves.north, waves.east])
+    single = np.zeros((6, k.size + -k.size % LANES))
+    single[:, : k.size] = k, k * waves.north, k * waves.east, w, waves.north, waves.east
     return Sea(
         waves,
         np.ascontiguousarray(single, dtype=np.float32),
         np.concatenate([volume.points, centres, probes, gauge, over]),
-        waves.density * volume.volumes,
-        masses,
+        len(volume.volumes),
+        np.concatenate([np.tile(waves.density * volume.volumes[:, None], 3), masses]),
         np.asarray(np.linalg.pinv(added, rcond=1e-12, hermitian=True), dtype=float),
         along.size,
         np.asarray(gauges.box, dtype=float) if gauges else np.zeros((2, 3)),
@@ -203,7 +204,7 @@ def passage(sea: Sea) -> Passage:
     """Empty sums for one thread."""
     n, points = sea.waves.amplitude.size, len(sea.points)
     felt = 1 + sea.stations
-    width = PROBES + 3 * (points - len(sea.masses) - len(sea.sections) - felt) + felt
+    width = PROBES + 3 * (points - len(sea.weights) - felt) + felt
     return Passage(
         time=np.array([0.0, -1.0]),
         value=np.zeros((2, width)),
@@ -212,40 +213,45 @@ def passage(sea: Sea) -> Passage:
         before=np.zeros(6),
         size=np.zeros((3, n)),
         phase=np.zeros((3, n)),
-        single_size=np.zeros((3, n), dtype=np.float32),
-        single_phase=np.zeros((3, n), dtype=np.float32),
+        single_size=np.zeros((3, sea.single.shape[1]), dtype=np.float32),
+        single_phase=np.zeros((3, sea.single.shape[1]), dtype=np.float32),
         place=np.zeros((points, 3)),
         motion=np.zeros((points, 3)),
-        sums=np.zeros(6),
-        body=np.zeros(6),
+        sums=np.zeros((points, 6)),
+        scratch=(np.zeros(points), np.zeros(points), np.zeros(points), np.zeros(points)),
+        gain=np.zeros(6),
         matrix=np.zeros((3, 3)),
     )
 
 
 @inlined
-def _place(sea: Sea, y: Array, time: float, pas: Passage) -> None:
-    """Points and their velocities from the shallowest one, in earth axes; phases and sizes there."""
-    m, w = pas.matrix, sea.waves
-    fill_rotation(y[PHI], y[THETA], y[PSI], m)
-    top, gauge = np.inf, sea.points.shape[0] - sea.stations - 1
-    for i in range(sea.points.shape[0]):
-        a, b, c = sea.points[i, 0], sea.points[i, 1], sea.points[i, 2]
-        u = y[0] + y[4] * c - y[5] * b
-        v = y[1] + y[5] * a - y[3] * c
-        d = y[2] + y[3] * b - y[4] * a
-        for k in range(3):
-            pas.place[i, k] = m[k, 0] * a + m[k, 1] * b + m[k, 2] * c
-            pas.motion[i, k] = m[k, 0] * u + m[k, 1] * v + m[k, 2] * d
+def _place(sea: Sea, y: Array, last: int, pas: Passage) -> float:
+    """Points up to ``last`` and their velocities in earth axes from the shallowest one, whose depth is given [m]."""
+    points, place, motion, m = sea.points, pas.place, pas.motion, pas.matrix
+    u, v, w, p, q, r, depth = y[0], y[1], y[2], y[3], y[4], y[5], y[Z]
+    m00, m01, m02, m10, m11, m12 = m[0, 0], m[0, 1], m[0, 2], m[1, 0], m[1, 1], m[1, 2]
+    m20, m21, m22 = m[2, 0], m[2, 1], m[2, 2]
+    top, gauge = np.inf, points.shape[0] - sea.stations - 1
+    for i in range(last):
+        a, b, c = points[i, 0], points[i, 1], points[i, 2]
+        ua, va, wa = u + q * c - r * b, v + r * a - p * c, w + p * b - q * a
+        place[i, 0], place[i, 1] = m00 * a + m01 * b + m02 * c, m10 * a + m11 * b + m12 * c
+        motion[i, 0], motion[i, 1] = m00 * ua + m01 * va + m02 * wa, m10 * ua + m11 * va + m12 * wa
         # Above the calm surface the waves keep the values they have there.
-        pas.place[i, 2] = max(y[Z] + pas.place[i, 2], 0.0)
+        z = max(depth + m20 * a + m21 * b + m22 * c, 0.0)
+        place[i, 2], motion[i, 2] = z, m20 * ua + m21 * va + m22 * wa
         if i < gauge:
-            top = min(top, pas.place[i, 2])
+            top = min(top, z)
     for i in range(gauge):
-        pas.place[i, 2] -= top
-    for i in range(gauge + 1, sea.points.shape[0]):
-        pas.place[i, 2] = pas.motion[i, 2] = 0.0
-    # Where the boat is in the water that carries the waves.
-    north, east = y[X] - w.flow_north * time, y[Y] - w.flow_east * time
+        place[i, 2] -= top
+    for i in range(gauge + 1, last):
+        place[i, 2] = motion[i, 2] = 0.0
+    return top
+
+
+@inlined
+def _fill_few(w: Waves, north: float, east: float, time: float, top: float, pas: Passage) -> None:
+    """Sizes and phases of the components at a place, time and depth."""
     for j in range(w.amplitude.size):
         angle = w.number[j] * (w.north[j] * north + w.east[j] * east) - w.frequency[j] * time + w.phase[j]
         angle -= TWO_PI * floor(angle / TWO_PI)
@@ -255,32 +261,67 @@ def _place(sea: Sea, y: Array, time: float, pas: Passage) -> None:
         pas.size[1, j], pas.phase[1, j] = size, angle
         # -sin a quarter period earlier is the cosine of the elevation.
         pas.size[2, j], pas.phase[2, j] = w.amplitude[j], angle - HALF_PI
-        for kind in range(3):
-            pas.single_size[kind, j] = pas.size[kind, j]
-            pas.single_phase[kind, j] = pas.phase[kind, j]
 
 
 @inlined
-def _to_body(sums: Array, m: Array, y: Array, body: Array) -> None:
-    """Earth vector and rate to body axes; the rate is that of the body-axis components."""
-    for k in range(3):
-        body[k] = m[0, k] * sums[0] + m[1, k] * sums[1] + m[2, k] * sums[2]
-        body[3 + k] = m[0, k] * sums[3] + m[1, k] * sums[4] + m[2, k] * sums[5]
-    body[3] -= y[4] * body[2] - y[5] * body[1]
-    body[4] -= y[5] * body[0] - y[3] * body[2]
-    body[5] -= y[3] * body[1] - y[4] * body[0]
+def _sum(sea: Sea, y: Array, time: float, last: int, pas: Passage) -> None:
+    """Sums at the points up to ``last``, in earth axes."""
+    w, top = sea.waves, _place(sea, y, last, pas)
+    # Where the boat is in the water that carries the waves.
+    north, east = y[X] - w.flow_north * time, y[Y] - w.flow_east * time
+    many = w.amplitude.size >= MANY
+    if many:
+        fill_many(w, north, east, time, top, pas.phase[0], pas.single_size, pas.single_phase)
+    else:
+        _fill_few(w, north, east, time, top, pas)
+    start, ends = 0, (sea.volumes, sea.points.shape[0] - sea.stations - 1, last)
+    for kind in range(3):
+        end = ends[kind]
+        if many:
+            sum_many(sea.single, pas.single_size, pas.single_phase, kind, pas.place, pas.motion, start, end, pas.sums)
+        else:
+            sum_few(w, pas.size[kind], pas.phase[kind], pas.place, pas.motion, start, end, pas.scratch, pas.sums)
+        start = end
 
 
-@inlined
-def _add(points: Array, i: int, fx: float, fy: float, fz: float, out: Array, at: int) -> None:
-    """Add a vector acting at a point and its moment about the origin."""
-    x, y, z = points[i, 0], points[i, 1], points[i, 2]
-    out[at] += fx
-    out[at + 1] += fy
-    out[at + 2] += fz
-    out[at + 3] += y * fz - z * fy
-    out[at + 4] += z * fx - x * fz
-    out[at + 5] += x * fy - y * fx
+@inner
+def _turn(sums: Array, last: int, m: Array, y: Array) -> None:
+    """Earth vectors and their rates to body axes, where they are; the rate is that of the body-axis components."""
+    m00, m01, m02, m10, m11, m12 = m[0, 0], m[0, 1], m[0, 2], m[1, 0], m[1, 1], m[1, 2]
+    m20, m21, m22, p, q, r = m[2, 0], m[2, 1], m[2, 2], y[3], y[4], y[5]
+    for i in range(last):
+        a, b, c = sums[i, 0], sums[i, 1], sums[i, 2]
+        da, db, dc = sums[i, 3], sums[i, 4], sums[i, 5]
+        u, v, w = m00 * a + m10 * b + m20 * c, m01 * a + m11 * b + m21 * c, m02 * a + m12 * b + m22 * c
+        sums[i, 0], sums[i, 1], sums[i, 2] = u, v, w
+        sums[i, 3] = m00 * da + m10 * db + m20 * dc - (q * w - r * v)
+        sums[i, 4] = m01 * da + m11 * db + m21 * dc - (r * u - p * w)
+        sums[i, 5] = m02 * da + m12 * db + m22 * dc - (p * v - q * u)
+
+
+@inner
+def _add_up(sea: Sea, first: int, last: int, sums: Array, value: Array, slope: Array, at: int) -> None:
+    """Vectors of points by their weights and their moments about the origin, and the rates of both."""
+    points, weights = sea.points, sea.weights
+    f0 = f1 = f2 = f3 = f4 = f5 = d0 = d1 = d2 = d3 = d4 = d5 = 0.0
+    for i in range(first, last):
+        x, y, z = points[i, 0], points[i, 1], points[i, 2]
+        a, b, c = weights[i, 0] * sums[i, 0], weights[i, 1] * sums[i, 1], weights[i, 2] * sums[i, 2]
+        f0 += a
+        f1 += b
+        f2 += c
+        f3 += y * c - z * b
+        f4 += z * a - x * c
+        f5 += x * b - y * a
+        a, b, c = weights[i, 0] * sums[i, 3], weights[i, 1] * sums[i, 4], weights[i, 2] * sums[i, 5]
+        d0 += a
+        d1 += b
+        d2 += c
+        d3 += y * c - z * b
+        d4 += z * a - x * c
+        d5 += x * b - y * a
+    value[at], value[at + 1], value[at + 2], value[at + 3], value[at + 4], value[at + 5] = f0, f1, f2, f3, f4, f5
+    slope[at], slope[at + 1], slope[at + 2], slope[at + 3], slope[at + 4], slope[at + 5] = d0, d1, d2, d3, d4, d5
 
 
 @inlined
@@ -306,36 +347,22 @@ def evaluate(sea: Sea, y: Array, time: float, pas: Passage, value: Array, slope:
         station [m, up], zero where no crest comes near the boat; and their rates. The rate of
         IMPULSE is the added-mass load.
     """
-    _place(sea, y, time, pas)
-    sums, body, many = pas.sums, pas.body, sea.waves.amplitude.size >= MANY
-    n, s = sea.masses.size, sea.sections.shape[0]
-    gauge = sea.points.shape[0] - sea.stations - 1
+    n, felt, gauge = sea.volumes, sea.weights.shape[0], sea.points.shape[0] - sea.stations - 1
+    fill_rotation(y[PHI], y[THETA], y[PSI], pas.matrix)
+    last = sea.points.shape[0] if _near(sea, y, pas.matrix) else gauge + 1
+    _sum(sea, y, time, last, pas)
+    _turn(pas.sums, gauge, pas.matrix, y)
     for i in range(value.size):
         value[i] = slope[i] = 0.0
-    for i in range(sea.points.shape[0] if _near(sea, y, pas.matrix) else gauge + 1):
-        kind = 0 if i < n else (1 if i < gauge else 2)
-        if many:
-            sum_many(sea.single, pas.single_size, pas.single_phase, kind, pas.place, pas.motion, i, sums)
-        else:
-            sum_few(sea.waves, pas.size, pas.phase, kind, pas.place, pas.motion, i, sums)
-        if i >= gauge:
-            value[PROBES + 3 * (gauge - n - s) + i - gauge] = sums[2]
-            slope[PROBES + 3 * (gauge - n - s) + i - gauge] = sums[5]
-            continue
-        _to_body(sums, pas.matrix, y, body)
-        if i < n:
-            m = sea.masses[i]
-            _add(sea.points, i, m * body[0], m * body[1], m * body[2], value, FORCE)
-            _add(sea.points, i, m * body[3], m * body[4], m * body[5], slope, FORCE)
-        elif i < n + s:
-            m0, m1, m2 = sea.sections[i - n, 0], sea.sections[i - n, 1], sea.sections[i - n, 2]
-            _add(sea.points, i, m0 * body[0], m1 * body[1], m2 * body[2], value, IMPULSE)
-            _add(sea.points, i, m0 * body[3], m1 * body[4], m2 * body[5], slope, IMPULSE)
-        else:
-            at = PROBES + 3 * (i - n - s)
-            for k in range(3):
-                value[at + k] = body[k]
-                slope[at + k] = body[3 + k]
+    _add_up(sea, 0, n, pas.sums, value, slope, FORCE)
+    _add_up(sea, n, felt, pas.sums, value, slope, IMPULSE)
+    for i in range(felt, gauge):
+        at = PROBES + 3 * (i - felt)
+        for k in range(3):
+            value[at + k], slope[at + k] = pas.sums[i, k], pas.sums[i, 3 + k]
+    for i in range(gauge, last):
+        at = PROBES + 3 * (gauge - felt) + i - gauge
+        value[at], slope[at] = pas.sums[i, 2], pas.sums[i, 5]
     for i in range(6):
         for j in range(6):
             value[WATER + i] += sea.compliance[i, j] * value[IMPULSE + j]

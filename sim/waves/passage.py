@@ -83,7 +83,7 @@ def advance(sea: Sea, y: Array, time: float, pas: Passage) -> bool:
     else:
         for i in range(pas.value.shape[1]):
             pas.value[0, i], pas.slope[0, i] = pas.value[1, i], pas.slope[1, i]
-    gain, mean = pas.body, pas.sums
+    gain, mean = pas.gain, pas.sums[0]
     for k in range(6):
         gain[k] = y[k] - pas.before[k] if known else 0.0
         pas.before[k] = y[k]
