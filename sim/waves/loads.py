@@ -61,6 +61,7 @@ class Sea(NamedTuple):
     stations : e. box : (2, 3) corners of a box around the boat [m]. crest : Highest elevation
         that can come [m].
     span : Time between sums [s]. reach : Largest miss of a predicted point that is accepted [m].
+    length : Of the longest way from the origin to a point along x [m].
     """
 
     waves: Waves
@@ -74,6 +75,7 @@ class Sea(NamedTuple):
     crest: float
     span: float
     reach: float
+    length: float
 
 
 class Passage(NamedTuple):
@@ -185,10 +187,11 @@ def make_sea(
     k, w, a = waves.number, waves.frequency, waves.amplitude
     single = np.zeros((6, k.size + -k.size % LANES))
     single[:, : k.size] = k, k * waves.north, k * waves.east, w, waves.north, waves.east
+    points = np.concatenate([volume.points, centres, probes, gauge, over])
     return Sea(
         waves,
         np.ascontiguousarray(single, dtype=np.float32),
-        np.concatenate([volume.points, centres, probes, gauge, over]),
+        points,
         len(volume.volumes),
         np.concatenate([np.tile(waves.density * volume.volumes[:, None], 3), masses]),
         np.asarray(np.linalg.pinv(added, rcond=1e-12, hermitian=True), dtype=float),
@@ -197,6 +200,7 @@ def make_sea(
         float(min(a.sum(), _HIGHEST * np.sqrt(0.5 * a @ a))),
         float(summing.span),
         float(summing.reach),
+        float(np.abs(points[:, 0]).max()),
     )
 
 

@@ -48,10 +48,7 @@ def _predict(sea: Sea, y: Array, gain: Array, mean: Array, matrix: Array, out: A
 @inner
 def _miss(sea: Sea, y: Array, pas: Passage) -> float:
     """Largest distance of a point from where it was predicted [m], and of its velocity over a span."""
-    size = 0.0
-    for i in range(sea.points.shape[0]):
-        size = max(size, abs(sea.points[i, 0]))
-    miss = 0.0
+    size, miss = sea.length, 0.0
     for k in range(3):
         place, turn = abs(y[6 + k] - pas.state[6 + k]), abs(y[9 + k] - pas.state[9 + k])
         speed, rate = abs(y[k] - pas.state[k]), abs(y[3 + k] - pas.state[3 + k])

@@ -159,6 +159,39 @@ def _gauss(x: Array, weight: Array, functions: Array, count: int) -> tuple[Array
     return middle + half * nodes, share**2, values
 
 
+def _stations(x: Array, weight: Array, functions: Array, number: float, tolerance: float) -> tuple[Array, Array, Array]:
+    """The Gauss rule of fewest stations that holds the load of a wave along them.
+
+    The load has a wave's pressure, its gradient times the centroids and its curvature times the second moments, each
+    with its lever; of any of them no more than a share of the largest load may be lost.
+
+    Parameters
+    ----------
+    x, weight : (m,) fine places and weights. functions : (m, 6) centroid and second moments of the section.
+    number : Largest wave number [1/m]. tolerance : Share of the load.
+
+    Returns
+    -------
+    As ``_gauss``.
+    """
+    middle, half = 0.5 * (x[0] + x[-1]), 0.5 * (x[-1] - x[0])
+    order = np.array([1.0, *[number] * 2, *[0.5 * number**2] * 4])
+
+    def load(at: Array, share: Array, shape: Array) -> Array:
+        wave = np.exp(1j * number * (at - middle))
+        lever = np.stack([np.ones(at.size), (at - middle) / half])
+        return np.asarray(np.einsum("i,li,ij->lj", share * wave, lever, np.column_stack([np.ones(at.size), shape])))
+
+    exact = load(x, weight, functions)
+    # Bessel coefficients of exp(ikx) over the part die out beyond k times its half length.
+    most = 4 + int(np.ceil(number * half))
+    for count in range(1, most):
+        rule = _gauss(x, weight, functions, count)
+        if (np.abs(load(*rule) - exact) * order).max() < tolerance * weight.sum():
+            return rule
+    return _gauss(x, weight, functions, most)
+
+
 def _principal(moments: Array) -> tuple[Array, Array]:
     """Principal second moments of a section (2,), ascending, and their axes as columns (2, 2).
 
@@ -188,20 +221,22 @@ def _part_points(part: Mesh, number: float, tolerance: float) -> tuple[Array, Ar
     kept = [k for k, cut in enumerate(cuts) if cut[0] > 0.0]
     area = np.array([cuts[k][0] for k in kept])
     shape = np.array([[*cuts[k][1], *(cuts[k][2] / cuts[k][0]).ravel()] for k in kept])
-    # Bessel coefficients of exp(ikx) over the part die out beyond k times its half length.
-    count = 4 + int(np.ceil(number * half))
-    at, weight, shape = _gauss(low[axis] + half * (1.0 + fine[kept]), half * steps[kept] * area, shape, count)
+    x, measure = low[axis] + half * (1.0 + fine[kept]), half * steps[kept] * area
+    at, weight, shape = _stations(x, measure, shape, number, tolerance)
     others = [(axis + 1) % 3, (axis + 2) % 3]
     points, volumes = [], []
-    for x, volume, (first, second, *moments) in zip(at, weight, shape, strict=True):
+    for place_x, volume, (first, second, *moments) in zip(at, weight, shape, strict=True):
         spread, axes = _principal(np.reshape(moments, (2, 2)))
-        if number**2 * spread[0] / 2.0 < tolerance:
+        share = volume / measure.sum()
+        if number**2 * spread[1] / 2.0 * share < tolerance / at.size:
+            offsets = np.zeros((1, 2))
+        elif number**2 * spread[0] / 2.0 * share < tolerance / at.size:
             offsets = np.sqrt(spread[1]) * np.array([axes[:, 1], -axes[:, 1]])
         else:
             pair = np.sqrt(2.0 * spread) * axes
             offsets = np.concatenate([pair.T, -pair.T])
         place = np.empty((len(offsets), 3))
-        place[:, axis] = x
+        place[:, axis] = place_x
         place[:, others] = np.array([first, second]) + offsets
         points.append(place)
         volumes.append(np.full(len(offsets), volume / len(offsets)))
