@@ -208,7 +208,7 @@ def announce(in_waves: bool, how_often: str = _ONCE) -> None:
 
 def _announce(function: Callable[..., Any], sig: Any, how_often: str) -> None:
     if function.__name__ in _LOOPS:
-        announce("Surroundings" in str(sig), how_often)
+        announce("Near(" in str(sig), how_often)
 
 
 def is_kept(function: Any, *arguments: Any) -> bool:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 from functools import partial
 
 import pytest
@@ -12,6 +15,37 @@ from sim.flight import ahead
 from sim.flight.case import load_case
 from sim.flight.maneuver import integrate
 from sim.flight.simulate import simulate
+
+ALONE = """
+from numba.core import event
+from sim.bench.boat import frozen_boat
+from sim.flight import ahead
+from sim.flight.case import load_case
+from sim.flight.simulate import simulate
+
+class Told(event.Listener):
+    def on_start(self, what):
+        print(what.data["dispatcher"].py_func.__qualname__)
+
+    def on_end(self, what):
+        pass
+
+case, _ = load_case("station-keeping-ss5")
+start = case.initial.model_copy(update={"state": "as_given", "revolutions_rps": 1.0})
+run = case.run.model_copy(update={"duration_s": 1.0})
+ahead.compile_loop(True)
+event.register("numba:compile", Told())
+simulate(case.model_copy(update={"run": run, "initial": start}), frozen_boat())
+print("flown")
+"""
+
+
+def test_a_flight_in_waves_compiles_nothing_that_was_not_ahead(tmp_path):
+    """In a fresh environment, without the search for an equilibrium, which is the other process's."""
+    env = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path), "PYTHONPATH": os.pathsep.join(sys.path)}
+    done = subprocess.run([sys.executable, "-c", ALONE], env=env, capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["flown"]
+    assert done.stderr.count("compiling the right-hand side in waves, once per installation, about 20 s") == 1
 
 
 def _flown(name: str, duration: float):

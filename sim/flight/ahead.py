@@ -1,7 +1,7 @@
 """The loop of a flight, compiled while another process reads files, looks for an equilibrium and compiles the rest.
 
-Nothing is flown: the compiler needs the types of the arguments alone. It begins where the other process ends, with
-the parts of the loop itself; what both need, one of them compiles and the other reads (``sim.compiled_cache``).
+Nothing is flown: the compiler needs the types of the arguments alone. It begins with what the other process comes to
+last, or waits for longest; what both need, one of them compiles and the other reads (``sim.compiled_cache``).
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from sim.kernel.rhs import BEGUN, fill_rate, step
 from sim.waves.drift import Drift
 from sim.waves.linear import regular
 from sim.waves.loads import Gauges, make_sea
+from sim.waves.passage import advance
 from sim.waves.pressure import Quadrature
 from sim.waves.surroundings import near_of, surroundings_of
 
@@ -42,12 +43,20 @@ def _parts(in_waves: bool) -> Iterator[tuple[Any, tuple[Any, ...]]]:
     around = _in_waves() if in_waves else ()
     near, stage = near_of(around), Stage(*[_REAL] * 5)
     v = Flight(*(_REAL, _WHOLE, _REAL, _WHOLE, _REAL, _WHOLE), _REAL, _REAL, _REAL, _WHOLE, stage, Sample(*[_REAL] * 4))
-    yield command_boat, (v.g, v.q, v.f, v.j, v.y, v.y, 0.0)
-    yield watch, (v.g, v.q, v.f, v.j, v.y, v.y, 0.0)
-    yield move_actuators, (v.g, v.q, v.f, v.c, 0.0, v.c)
-    yield past, (v.g, v.q, v.f, v.j, v.y, 0.0)
-    yield fill_rate, (v.m, v.w, v.y, v.c, near, v.s, v.k, v.y)
-    yield step, (v.m, v.w, v.y, v.c, v.c, 0.0, near, v.s, v.k, stage, BEGUN, v.y)
+    apart = (
+        (past, (v.g, v.q, v.f, v.j, v.y, 0.0)),
+        (move_actuators, (v.g, v.q, v.f, v.c, 0.0, v.c)),
+        (command_boat, (v.g, v.q, v.f, v.j, v.y, v.y, 0.0)),
+        (watch, (v.g, v.q, v.f, v.j, v.y, v.y, 0.0)),
+    )
+    rates = (
+        (fill_rate, (v.m, v.w, v.y, v.c, near, v.s, v.k, v.y)),
+        (step, (v.m, v.w, v.y, v.c, v.c, 0.0, near, v.s, v.k, stage, BEGUN, v.y)),
+    )
+    if in_waves:
+        yield advance, (around.sea, v.y, 0.0, around.sums)
+    # In calm water the other process begins with the right-hand side, for the equilibrium.
+    yield from (*rates, *apart) if in_waves else (*apart, *rates)
     yield integrate, (v, around, Log(_TABLE, _TABLE, _TABLE), 0.0, 0, 0, BEGUN, 0.0)
 
 
