@@ -63,12 +63,13 @@ def draw(asked: AnimateOptions) -> None:
     import ident
     from ident.animation.film import Film, writer_of
     from ident.animation.film import animate as as_film
+    from ident.validation.compiling import loop_of
     from sim.boat.database import version_words
 
     console = console_for(quiet=asked.json_path == "-")
     if asked.out is not None:
         writer_of(asked.out, asked.fps)
-    with equilibrium_of(asked.case), console.status("flying the case"):
+    with equilibrium_of(asked.case), console.status("flying the case"), loop_of(asked.case):
         done = ident.validate(asked.case, asked.db, asked.version, vehicle=asked.vehicle)
     title = f"{done.case.title}, {done.case.vehicle}; {version_words(done.database)}"
     path = asked.out or Path(f"{in_file_name(done.case.name)}.gif")

@@ -67,10 +67,11 @@ def fly(**options: Any) -> None:
     asked = FlyOptions(**options)
     asked.check()
     from ident.exports.fly import Draws, Recording, fly_to_file
+    from ident.validation.compiling import loop_of
 
     draws = Draws(asked.samples, asked.seed or 0, _shares(asked.quantiles)) if asked.samples else None
     console = console_for(quiet=asked.json_path == "-")
-    with equilibrium_of(asked.case), console.status("flying the case"):
+    with equilibrium_of(asked.case), console.status("flying the case"), loop_of(asked.case):
         recording = Recording(asked.every, draws, asked.loads)
         written = fly_to_file(asked.case, asked.db, asked.version, asked.vehicle, asked.out, recording)
     console.print(f"history: {on_screen(written.file)}, {written.records} records", highlight=False)

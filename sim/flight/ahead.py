@@ -40,7 +40,7 @@ def _in_waves() -> Around:
 
 def _parts(in_waves: bool) -> Iterator[tuple[Any, tuple[Any, ...]]]:
     """Compiled functions of a flight with arguments as they are called with, the loop itself last."""
-    around = _in_waves() if in_waves else ()
+    around: Around = _in_waves() if in_waves else ()
     near, stage = near_of(around), Stage(*[_REAL] * 5)
     v = Flight(*(_REAL, _WHOLE, _REAL, _WHOLE, _REAL, _WHOLE), _REAL, _REAL, _REAL, _WHOLE, stage, Sample(*[_REAL] * 4))
     apart = (
