@@ -10,7 +10,7 @@ import pytest
 from made_campaigns import BETA, VALUES, assert_values, read, tidy
 
 from ident.captive.campaign import read_campaign
-from ident.captive.quantities import column
+from ident.captive.headers import column
 from ident.checks.check import check_campaign
 from sim.files.errors import InputError
 
@@ -110,7 +110,7 @@ def test_a_declared_header_that_holds_a_power_of_ten_or_a_share_asks_for_the_fac
     with pytest.raises(InputError, match=r"names a multiple|one unit"):
         column(header, declared, "f")
     if "[" not in header:
-        assert column(header, declared, "f", factored=True).factor == 1.0
+        assert column(header, declared, "f", [header]).factor == 1.0
 
 
 @pytest.mark.parametrize("header", ["Ch 10", "Gauge 100", "1. Fx", "ch1/ch10", "Speed (100 %)", "X (10^-3 kN)"])

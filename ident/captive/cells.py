@@ -15,6 +15,7 @@ from ident.captive.readers.text import LARGEST, odd
 from ident.captive.run_table import DIRECT, sigma
 from ident.captive.source import Source
 from ident.captive.stated import signed
+from ident.timeseries.faults import BEYOND, sentinel
 from sim.boat.catalogue import OUTPUTS
 from sim.files.errors import InputError
 
@@ -24,6 +25,8 @@ _MARKED = re.compile(
     r"(?P<value>.*\d\)?)\s*(?P<mark>[*\u2020\u2021\u00a7\u00b6#]+|[\u00b9\u00b2\u00b3\u2070-\u2079\u1d43-\u1d4d]+)"
 )
 _LEDGER = re.compile(r"\(\s*(\d[\d.,' ]*)\s*\)")
+# Other values of a column that one is held against.
+_OTHERS = 3
 _DIGITS = frozenset("0123456789+-.eE")
 
 
@@ -133,16 +136,17 @@ def _words(cells: Sequence[str]) -> np.ndarray:
 
 def _numbers(sheet: Sheet, cells: Sequence[str], rows: list[int], kind: Column, beside: _Beside) -> np.ndarray:
     """A column of a run table as numbers; blank, or stated to be missing, is NaN."""
-    missing = beside.source.missing
+    missing, words = beside.source.missing_numbers, beside.source.missing_words
     signless = kind.quantity.startswith("s_") or kind.quantity == "rel_sigma"
     plain = _plain_numbers(cells) if (sheet.dialect.decimal, sheet.dialect.thousands) == (".", "") else None
     if plain is not None and not (signless and (plain < 0.0).any()):
+        _refuse_sentinel(sheet, plain, rows, kind, missing)
         return np.where(np.isin(plain, list(missing)), np.nan, plain * kind.factor) if missing else plain * kind.factor
     values = np.full(len(cells), np.nan)
     # Brackets are an accountant's minus in a column that has no other one.
     ledger = signed(kind.quantity) and not any(c.strip()[:1] in "-\u2212\u2013\uff0d" for c in cells if c.strip())
     for i, cell in enumerate(cells):
-        if not cell.strip():
+        if not cell.strip() or cell.strip() in words:
             continue
         value = sheet.dialect.number(cell)
         if value is None and ledger and (inside := _LEDGER.fullmatch(cell.strip())):
@@ -156,7 +160,23 @@ def _numbers(sheet: Sheet, cells: Sequence[str], rows: list[int], kind: Column, 
         if value < 0.0 and signless:
             raise InputError(f"{sheet.path}, row {rows[i]}, column {kind.name[:60]}", cell[:60], "zero or more")
         values[i] = np.nan if value in missing else value * kind.factor
+    _refuse_sentinel(sheet, values / kind.factor, rows, kind, missing)
     return values
+
+
+def _refuse_sentinel(sheet: Sheet, values: np.ndarray, rows: list[int], kind: Column, missing: Sequence[float]) -> None:
+    """Refuse a number that loggers write where they have nothing, far outside of all others of its column."""
+    known = np.array([sentinel(float(v)) and v not in missing for v in values], dtype=bool)
+    others = values[~known & ~np.isnan(values) & ~np.isin(values, list(missing))]
+    if not known.any() or others.size < _OTHERS:
+        return
+    for i in np.flatnonzero(known):
+        if abs(values[i]) > BEYOND * np.abs(others).max():
+            place = f"{sheet.path}, row {rows[i]}, column {kind.name[:60]}"
+            text = (
+                f"missing = [{values[i]:.10g}] in [[source]] where it stands for nothing measured; or the load excluded"
+            )
+            raise InputError(place, f"{values[i]:.10g}, beside others of at most {np.abs(others).max():.3g}", text)
 
 
 def _plain_numbers(cells: Sequence[str]) -> np.ndarray | None:

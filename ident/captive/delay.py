@@ -33,6 +33,8 @@ _STEP = 0.02
 # Samples that are looked at, after averaging neighbours; fewest in a period.
 _MOST = 4096
 _PER_PERIOD = 12
+# Steps that differ by more than this factor are no clock that a spline is laid through.
+_UNEVEN = 5.0
 # A lag is seen when its standard error is below this share of a period, and no other lag fits as well by so
 # many standard errors.
 _SEEN = 0.005
@@ -77,7 +79,10 @@ def of_loads(
         return None
     t, w = _means(time, step, n), _means(weight, step, n)
     inside = (t > t[0] + 0.5 * period) & (t < t[-1] - 0.5 * period)
-    if np.median(np.diff(t)) > period / _PER_PERIOD or inside.sum() < 4 * _PER_PERIOD:
+    apart = np.diff(t)
+    # A spline through samples that lie close together here and far apart there has no second derivative to go by.
+    even = float(apart.max()) < _UNEVEN * float(np.median(apart)) and float(apart.min()) * _UNEVEN > np.median(apart)
+    if np.median(apart) > period / _PER_PERIOD or inside.sum() < 4 * _PER_PERIOD or not even:
         return None
     # Few records need them, and they are slow to load.
     from scipy.interpolate import CubicSpline

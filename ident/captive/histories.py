@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ident.captive import delay
 from ident.captive.channels import Channels, Timed, timed
 from ident.captive.left_behind import LeftBehind
-from ident.captive.motion import frequency_of, line_of, phase_is_known
+from ident.captive.motion import frequency_of, line_of, phase_is_known, phase_is_taken, stated_frequency
 from ident.captive.oscillation import PHASES, Oscillation
 from ident.captive.quantities import HARMONICS, TAKEN
 from ident.captive.source import MOTIONS, Reduction
@@ -44,6 +44,7 @@ class Reduced:
     left_out : (kind, channel) -> samples that were no measurements, see ``ident.timeseries.faults``.
     clipped : Channel -> how it is clipped.
     samples : All of them, in the window.
+    phase_taken : Whether the phase of an oscillation is nowhere stated or measured, and taken as zero at time zero.
     stated_hz : Frequency of an oscillation as stated, where the record's own was used instead.
     line : Frequency found in the record.
     delays : By how much channels come behind the motion, beyond what is stated.
@@ -61,6 +62,7 @@ class Reduced:
     left_out: dict[tuple[str, str], int] = field(default_factory=dict)
     clipped: dict[str, str] = field(default_factory=dict)
     samples: int = 0
+    phase_taken: bool = False
     stated_hz: float | None = None
     line: Line | None = None
     delays: tuple[delay.Delay, ...] = ()
@@ -155,6 +157,7 @@ def reduce(channels: Channels, rule: Reduction, run_id: str, frequency: float | 
     sound, faults = _sound(channels, rule, names)
     line, stated = None, None
     if rule.kind == "oscillatory":
+        frequency = stated_frequency(channels, frequency)
         line = line_of(sound(None), names, frequency, channels)
         frequency, stated = frequency_of(line, frequency, names, rule, channels)
         phase_is_known(channels, rule, names)
@@ -174,6 +177,7 @@ def reduce(channels: Channels, rule: Reduction, run_id: str, frequency: float | 
         left_out=dict(faults.counts),
         clipped=faults.clipped,
         samples=condensed.samples + sum(faults.counts.values()),
+        phase_taken=rule.kind == "oscillatory" and phase_is_taken(names, rule),
         stated_hz=stated,
         line=line,
     )

@@ -18,8 +18,10 @@ from sim.files.frames import Frame
 
 Array = NDArray[np.float64]
 
+# Of a moment that has next to nothing in phase, this share of its swing counts as what it has there.
+_LEAST = 0.05
 # Motion -> axis, and moments with the force whose arm the displacement is and the sign of lever x force.
-_ARMS = {
+ARMS = {
     "surge": ("x", {"M": ("Z", -1.0), "N": ("Y", 1.0)}),
     "sway": ("y", {"N": ("X", -1.0), "K": ("Z", 1.0)}),
     "heave": ("z", {"M": ("X", 1.0), "K": ("Y", -1.0)}),
@@ -33,7 +35,7 @@ class LeftBehind:
     Attributes
     ----------
     motion, moment, force : What moves, the moment, and the force whose arm the displacement is.
-    in_phase, swing : What a point that stays adds to the moment in phase, and the moment's own swing [N m].
+    in_phase, own : What a point that stays adds to the moment in phase, and what the moment has there [N m].
     third, shown, error : What it adds to the third harmonic in phase, what the record has there, its standard error.
     """
 
@@ -41,7 +43,7 @@ class LeftBehind:
     moment: str
     force: str
     in_phase: float
-    swing: float
+    own: float
     third: float
     shown: float
     error: float
@@ -65,7 +67,7 @@ def left_behind(
     harmonics, covariance : Load -> (7,) in the phase of the displacement and (7, 7), campaign frame.
     frame : Of the campaign.
     """
-    axis, arms = _ARMS.get(motion, ("", {}))
+    axis, arms = ARMS.get(motion, ("", {}))
     mean, second, third = (HARMONICS.index(k) for k in ("mean", "out2", "in3"))
     found = []
     for moment, (force, sense) in arms.items():
@@ -80,7 +82,7 @@ def left_behind(
                 moment=moment,
                 force=force,
                 in_phase=float(arm * (push[mean] - 0.5 * push[second])),
-                swing=float(np.hypot(*turn[1:3])),
+                own=max(abs(float(turn[1])), _LEAST * float(np.hypot(*turn[1:3]))),
                 third=float(0.5 * arm * push[second]),
                 shown=float(turn[third]),
                 error=error,

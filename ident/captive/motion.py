@@ -65,6 +65,31 @@ def frequency_of(
     return (line.frequency, stated) if off > _SURE * line.stderr and drift > _DRIFT else (stated, None)
 
 
+def stated_frequency(channels: Channels, frequency: float | None) -> float | None:
+    """The frequency that a campaign or a channel of the record states [Hz]; None for neither.
+
+    Raises
+    ------
+    InputError
+        For both, or a channel that changes.
+    """
+    if "frequency" not in channels.quantities:
+        return frequency
+    place = f"{channels.path}, column frequency"
+    if frequency is not None:
+        raise InputError(place, "a channel, and frequency stated in the campaign too", "one of the two")
+    values = next((piece[:, channels.quantities.index("frequency")] for piece in channels.pieces()), np.zeros(0))
+    if not values.size or not values[0] > 0.0 or np.ptp(values) > _OFF * values[0]:
+        shown = f"{values.min():.4g} to {values.max():.4g} Hz" if values.size else "nothing"
+        raise InputError(place, shown, "one frequency all along")
+    return float(values.mean())
+
+
+def phase_is_taken(names: list[str], rule: Reduction) -> bool:
+    """Whether nothing says the phase of the displacement, so that it is zero at time zero."""
+    return "displacement" not in names and "phase_deg" not in rule.model_fields_set
+
+
 def span_of(channels: Channels, rule: Reduction) -> float:
     """Length of a history within its window [s]."""
     first, last = math.inf, -math.inf

@@ -66,12 +66,13 @@ class Oscillation:
 
     @classmethod
     def of_row(cls, row: Mapping[str, Any]) -> Oscillation:
-        """From a row of a table: ``X_mean``, ``X_in``, ... beside the state, ``frequency`` and ``amplitude``."""
+        """From a row of a table: ``X_mean``, ``X_in``, ... beside the state, ``frequency`` and ``displacement``."""
         apart = ("frequency", "amplitude", "displacement")
         state = {k: v for k, v in row.items() if k not in apart and ("_" not in k or k.split("_")[-1] not in HARMONICS)}
         named = {o: [f"{o}_{h}" for h in HARMONICS] for o in _LOADS}
         harmonics = {o: np.array([row.get(k, math.nan) for k in keys], dtype=float) for o, keys in named.items()}
-        return cls(state, harmonics, frequency=row.get("frequency"), amplitude=row.get("amplitude"))
+        stated = [row[k] for k in ("amplitude", "displacement") if row.get(k) is not None]
+        return cls(state, harmonics, frequency=row.get("frequency"), amplitude=stated[0] if stated else None)
 
 
 def states(run: Oscillation, rule: Reduction, frame: Frame, ittc: bool, where: str) -> list[dict[str, Any]]:
@@ -99,9 +100,7 @@ def states(run: Oscillation, rule: Reduction, frame: Frame, ittc: bool, where: s
     """
     assert rule.motion is not None
     speed_name, acceleration_name = MOTIONS[rule.motion]
-    omega = 2.0 * math.pi * float((rule.frequency_hz if run.frequency is None else run.frequency) or math.nan)
-    if not omega > 0.0:
-        raise InputError(f"{where}, column frequency", "nothing", "a frequency, or frequency_hz in [source.reduction]")
+    omega = _omega(run, rule, where)
     speed, given = _amplitudes(run, rule, omega, where)
     made = []
     for name, theta in PHASES.items():
@@ -129,6 +128,25 @@ def states(run: Oscillation, rule: Reduction, frame: Frame, ittc: bool, where: s
     return made
 
 
+def amplitude_of(run: Oscillation, rule: Reduction, where: str) -> float:
+    """Amplitude A of the displacement A sin(theta) [m, rad], along the axis of the campaign.
+
+    Raises
+    ------
+    InputError
+        Without frequency, or amplitude.
+    """
+    omega = _omega(run, rule, where)
+    return _amplitudes(run, rule, omega, where)[0] / omega
+
+
+def _omega(run: Oscillation, rule: Reduction, where: str) -> float:
+    omega = 2.0 * math.pi * float((rule.frequency_hz if run.frequency is None else run.frequency) or math.nan)
+    if not omega > 0.0:
+        raise InputError(f"{where}, column frequency", "nothing", "a frequency, or frequency_hz in [source.reduction]")
+    return omega
+
+
 def _amplitudes(run: Oscillation, rule: Reduction, omega: float, where: str) -> tuple[float, float]:
     """Amplitudes of velocity (of cosine) and acceleration (of sine), from what the run gives."""
     speed_name, acceleration_name = MOTIONS[rule.motion or "sway"]
@@ -144,6 +162,13 @@ def _amplitudes(run: Oscillation, rule: Reduction, omega: float, where: str) -> 
     else:
         text = f"amplitude in [source.reduction], a column displacement, or the amplitude {acceleration_name}"
         raise InputError(f"{where}, column displacement", "nothing", text)
+    # In a table all three are as printed; of a record's own channels each has its noise.
+    printed = not run.covariance and bool(known) and amplitude is not None and not math.isnan(amplitude)
+    if printed and abs(abs(speed) - abs(float(amplitude or 0.0)) * omega) > _AGREE * abs(speed):
+        wrong = (
+            f"an amplitude of {float(amplitude or 0.0):g}, and {', '.join(f'{k} = {v:g}' for k, v in known.items())}"
+        )
+        raise InputError(where, wrong, f"amplitudes that agree, with omega = {omega:g} rad/s; or one of them")
     off = abs(speed - known.get(speed_name, speed))
     if off > _AGREE * abs(speed):
         wrong = f"amplitudes {speed_name} = {known[speed_name]:g} and {acceleration_name} = {-speed * omega:g}"

@@ -7,7 +7,6 @@ have the dimension of the quantity.
 
 from __future__ import annotations
 
-import math
 import re
 from dataclasses import dataclass
 from functools import cache
@@ -17,7 +16,6 @@ from typing import Any
 import pandas as pd
 
 from sim.boat.catalogue import OUTPUTS
-from sim.files.errors import InputError
 
 # A load, its standard error, and what an oscillatory test is reduced to: mean, then in
 # phase and in quadrature with the displacement, first to third harmonic.
@@ -36,7 +34,7 @@ PRIMED = {
 }
 _BRACKET = re.compile(r"^(?P<name>.*?)\s*(?:\[(?P<square>[^\[\]]*)\]|\((?P<round>[^()]*)\))$", re.DOTALL)
 _PART = re.compile(r"([A-Za-zµ]+)(?:(?:\*\*|\^)?(-?[1-4]))?")
-_RAISED = str.maketrans("⁻⁺⁰¹²³⁴⁵⁶⁷⁸⁹", "-+0123456789")
+RAISED = str.maketrans("⁻⁺⁰¹²³⁴⁵⁶⁷⁸⁹", "-+0123456789")
 # A unit with a power of ten before it: 10^3 N, 1e3 N, 10³ N.
 _POWER = re.compile(
     r"(?:10\s*(?:\^|\*\*)\s*(?P<a>[-+]?\d)|1[eE](?P<b>[-+]?\d)|10(?P<c>[⁻⁺]?[⁰¹²³⁴⁵⁶⁷⁸⁹]))"
@@ -45,50 +43,7 @@ _POWER = re.compile(
 # A unit after a slash or a comma, as DIN 1313 and some loggers write it: F_y / kN; Fy, kN.
 _AFTER = re.compile(r"^(?P<name>.*\S)(?:\s+/\s+|\s*,\s+)(?P<unit>\S.*)$")
 _ANGLES = {"radian", "degree", "turn", "grade", "arcminute", "arcsecond", "milliradian"}
-# Coefficients that are printed times ten, and headers that say so: 10KQ, 10 Kq [-], KQ x 10; and primes, Y' x1000,
-# N' (*10^3). In front of or behind a dimensionless symbol, what is printed is the multiple.
-_BARE = ("KT", "KQ", "J", "t")
-_TENS = (
-    r"1(?P<zeros>0{1,6})|10\s*(?:\^|\*\*)\s*(?P<power>[1-6])|10(?P<raised>[\u00b9\u00b2\u00b3\u2074-\u2076])"
-    r"|1[eE]\+?(?P<e>[1-6])"
-)
-_SIGN = "[*x\u00b7\u00d7\u2219\u2022\u22c5\u2217]"
-_BEFORE = re.compile(rf"(?:{_TENS})\s*{_SIGN}?\s*(?P<name>[A-Za-z]+'?)\s*(?:\[-?\]|\(-?\))?")
-_BEHIND = re.compile(rf"(?P<name>[A-Za-z]+'?)\s*(?:\[-?\]|\(-?\))?\s*\(?\s*{_SIGN}\s*(?:{_TENS})\s*\)?")
-_TIMES = re.compile(
-    rf"(?i)(^|\s|\()1(0{{1,6}}|e[+-]?\d)\s*{_SIGN}?\s*[a-z]{{1,2}}(?![a-z])"
-    rf"|{_SIGN}\s*(10{{1,6}}|10\s*(\^|\*\*|e)\s*[-+]?\d+|1e[+-]?\d+)\b"
-)
-# Powers of ten in any other place of a header, which a declaration would let pass as a part of its name: KQ/10, 0.1 KQ,
-# Y' 10^3, Y' (10-3), 1/1000; and shares of a hundred or a thousand of what has no unit.
-_TEN_SOMEWHERE = re.compile(
-    r"10\s*(?:\^|\*\*)\s*[-+\u2212\u2013]?\s*\d|10[\u207b\u207a]?[\u00b9\u00b2\u00b3\u2074-\u2079]"
-    r"|[\[(]\s*10\s*[-\u2212\u2013]\s*\d\s*[\])]|\b1[eE][-+\u2212]?\d\b|'[eE][-+]?\d\b|\b1\s*/\s*10{1,6}\b"
-    r"|/\s*(?:10{1,6}|0?\.0*1)(?![\d.])|(?:^|[\s(\[])0?\.0*1\s*[*x\u00b7\u00d7]?\s*[A-Za-z]"
-)
-_SHARE = re.compile(
-    r"(?i)[%\u2030]|(?<![a-z])(?:per\s?cent|pct|per\s?mill?e?|pro\s?mill?e?|pp[mt]|(?:hundred|thousand)ths?)(?![a-z])"
-)
-# Names of other papers and laboratories -> the quantity that is meant, for the message.
-_MEANT = {
-    **dict.fromkeys(
-        ("delta", "Delta", "DELTA", "δ", "rudder", "Rudder", "RudderAngle", "deltar", "deltas", "deltaR"), "plane"
-    ),
-    **dict.fromkeys(("drift", "Drift", "driftangle", "β", "Beta", "BETA", "leeway", "sideslip"), "beta"),
-    **dict.fromkeys(("incidence", "aoa", "AoA", "AOA", "α", "Alpha", "ALPHA", "pitch", "theta", "trim"), "alpha"),
-    **dict.fromkeys(("R", "radius", "Radius", "Rm"), "R0"),
-    **dict.fromkeys(("V", "speed", "Speed", "velocity", "Vm", "Um"), "U"),
-    **dict.fromkeys(("Fx", "FX", "Drag", "drag", "Resistance"), "X"),
-    **dict.fromkeys(("Fy", "FY", "SideForce", "Fsway"), "Y"),
-    **dict.fromkeys(("Fz", "FZ", "Lift", "lift", "Heave"), "Z"),
-    **dict.fromkeys(("Mx", "MX", "RollMoment"), "K"),
-    **dict.fromkeys(("My", "MY", "PitchMoment"), "M"),
-    **dict.fromkeys(("Mz", "MZ", "YawMoment"), "N"),
-    **dict.fromkeys(("rpm", "RPM", "rps", "RPS", "revs"), "n"),
-    **dict.fromkeys(("Time", "TIME", "t", "flowtime"), "time"),
-    "L/R": "r",
-}
-_NO_UNIT = ("", "-", "1", "/")
+NO_UNIT = ("", "-", "1", "/")
 
 
 @dataclass(frozen=True)
@@ -180,8 +135,11 @@ def split(header: str) -> tuple[str, str | None]:
 
 def _clean(unit: str) -> str | None:
     """A unit in the one spelling handed to pint, or None when it is not made of units."""
-    text = re.sub(r"(?<=[A-Za-z])-(?=[A-Za-z])", "*", unit)
-    text = text.replace("°", "deg").replace("º", "deg").translate(_RAISED)
+    # 1/Deg, /deg and per degree are one.
+    text = re.sub(r"(?i)\bdeg(?:s|rees?)?\b\.?", "deg", unit.strip())
+    text = re.sub(r"^(?:/|[Pp]er\s)\s*", "1/", re.sub(r"\s+[Pp]er\s+", "/", text))
+    text = re.sub(r"(?<=[A-Za-z])-(?=[A-Za-z])", "*", text)
+    text = text.replace("°", "deg").replace("º", "deg").translate(RAISED)
     text = re.sub(r"[·⋅.]", "*", text.replace("^", "**"))
     text = re.sub(r"(?<![*/])\s+(?![*/])", "*", text.strip())
     # A product in brackets divides as a whole: kg/(m rad) is kg/m/rad.
@@ -215,13 +173,13 @@ def factor(quantity: str, unit: str) -> float | None:
         return choices[unit]
     if (power := _POWER.fullmatch(unit)) is not None:
         base = factor(quantity, power["unit"])
-        ten = (power["a"] or power["b"] or power["c"].translate(_RAISED)) if base is not None else ""
+        ten = (power["a"] or power["b"] or power["c"].translate(RAISED)) if base is not None else ""
         return None if base is None or not -9 <= int(ten) <= 9 else base * 10.0 ** int(ten)
     spelled = _other_spellings().get(unit)
     if spelled is not None and (base := factor(quantity, spelled)) is not None:
         return base
-    if unit in _NO_UNIT or quantity not in _spelled() or len(unit) > 40:
-        return choices.get("") if unit in _NO_UNIT else None
+    if unit in NO_UNIT or quantity not in _spelled() or len(unit) > 40:
+        return choices.get("") if unit in NO_UNIT else None
     text = _clean(unit)
     if text is None:
         return None
@@ -282,19 +240,16 @@ def allowed_units(quantity: str) -> str:
     return (", ".join(listed) + more) if listed else "no unit: it is dimensionless"
 
 
-def _contradiction(quantity: str, header: str, unit: str, place: str) -> None:
-    """Refuse a header whose brackets hold another unit than the declaration; words in round ones are no unit."""
-    stated = split(header)[1]
-    if not quantity or stated in (None, "", unit) or (header.rstrip().endswith(")") and not is_unit(stated or "")):
-        return
-    there, here = factor(quantity, stated or ""), factor(quantity, unit)
-    if there is None or here is None or not math.isclose(there, here, rel_tol=1e-12):
-        raise InputError(place, f"unit {stated!r}, declared as {unit!r}", "one unit: leave it out of the declaration")
+@cache
+def unit_words() -> frozenset[str]:
+    """Units as words of their own: suffixes of run files, spellings of laboratories and what those stand for."""
+    listed = {unit for choices in units().values() for unit in choices if unit not in NO_UNIT}
+    return frozenset(listed | set(_other_spellings()) | set(_other_spellings().values()))
 
 
 def is_unit(text: str) -> bool:
     """Whether some quantity has this unit, or pint knows it, capitals or not."""
-    if text in _NO_UNIT or text in _other_spellings() or any(text in choices for choices in units().values()):
+    if text in NO_UNIT or text in _other_spellings() or any(text in choices for choices in units().values()):
         return True
     if (power := _POWER.fullmatch(text)) is not None:
         return is_unit(power["unit"])
@@ -305,98 +260,3 @@ def is_unit(text: str) -> bool:
         return cleaned is not None and bool(_registry().parse_units(cleaned, case_sensitive=False))
     except (pint.errors.PintError, ValueError, TypeError, AttributeError, ArithmeticError):
         return False
-
-
-def _multiple(header: str, declared: str | None) -> Column | None:
-    """A dimensionless column whose header says by what its numbers are multiplied; None for others.
-
-    ``10KQ`` holds ten times KQ, ``Y' x1000`` a thousand times Y'. A load with a unit may mean either, and is not read.
-    """
-    times = _BEFORE.fullmatch(header) or _BEHIND.fullmatch(header)
-    if times is None:
-        return None
-    ten = times["zeros"] and len(times["zeros"])
-    ten = ten or times["power"] or times["e"] or str(times["raised"]).translate(_RAISED)
-    name, unit = split(declared) if declared is not None else (times["name"], None)
-    name = {"kt": "KT", "kq": "KQ"}.get(name.lower(), name)
-    bare = name.removesuffix("'")
-    primed = name.endswith("'") or times["name"].endswith("'") or unit == "-"
-    if owner(bare) in _BARE and owner(bare) == bare and unit in (None, *_NO_UNIT):
-        return Column(header, bare, 10.0 ** -int(ten))
-    if owner(bare) in PRIMED and owner(bare) == bare and primed and unit in (None, *_NO_UNIT):
-        return Column(header, bare, 10.0 ** -int(ten), primed=True)
-    return None
-
-
-def _other_multiple(header: str, declared: str | None) -> bool:
-    """Whether a declared header holds a power of ten outside of its unit, or is a share of what has no unit."""
-    if declared is None:
-        return False
-    name, unit = split(declared)
-    quantity = owner(name.removesuffix("'"))
-    if not quantity:
-        return False
-    own, stated = split(header)
-    plain = "" in units()[quantity] or name.endswith("'") or unit in _NO_UNIT
-    # Of a unit the power of ten is read with it.
-    rest = own if stated and factor(quantity, stated) is not None else header
-    letters = re.sub(r"[^a-z]", "", own.lower())
-    before = re.match(r"10{1,6}[-_\s]", header) and letters == re.sub(r"[^a-z]", "", name.lower())
-    return bool(_TEN_SOMEWHERE.search(rest) or before or (plain and _SHARE.search(rest)))
-
-
-def column(header: str, declared: str | None, where: str, factored: bool = False) -> Column:
-    """What a column is, from its header and what the campaign declares it to be.
-
-    Parameters
-    ----------
-    header : As it stands in the file: ``U_kts``, ``Fx [kN]``, ``N'``.
-    declared : ``X`` or ``X [kN]`` from ``[source.columns]``; None to read the header itself.
-    where : File and row, for the error.
-    factored : Whether ``[source.factor]`` names the column.
-
-    Raises
-    ------
-    InputError
-        For an unknown quantity, a header that names a multiple without a stated factor, or a
-        wrong, missing or contradicting unit.
-    """
-    if declared is None and header in suffixed():
-        return Column(header, *suffixed()[header])
-    place = f"{where}, column {header[:60]!r}"
-    if not factored and (multiple := _multiple(header, declared)) is not None:
-        return multiple
-    if not factored and (_TIMES.search(header) or _other_multiple(header, declared)):
-        text = "a factor in [source.factor]: what a value is multiplied by to give the quantity"
-        raise InputError(place, "a header that names a multiple", text)
-    if declared is not None and declared in suffixed():
-        quantity, scale = suffixed()[declared]
-        if owner(quantity) != declared or "" in units()[owner(quantity)]:
-            return Column(header, quantity, scale)
-    name, unit = split(header if declared is None else declared)
-    if declared is not None and unit is None:
-        unit = split(header)[1]
-    elif declared is not None:
-        _contradiction(owner(name.removesuffix("'")), header, unit or "", place)
-    if name.endswith("'") and owner(name[:-1]) in PRIMED:
-        name, unit = name[:-1], "-" if unit is None else unit
-    known = owner(name)
-    if not known:
-        stem = header.rsplit("_", 1)[0]
-        like = [c for c in suffixed() if c.rsplit("_", 1)[0] == stem]
-        meant = _MEANT.get(re.sub(r"[^a-zA-Zβαδψ/]", "", split(header)[0]))
-        usual = "a known quantity with its unit, such as U_mps, X_N, K [kN m]; or name it in [source.columns] or ignore"
-        meant = f'{meant}: "{header[:40]}" = "{meant} [...]" in [source.columns]' if meant else ""
-        text = ", ".join(like) or meant or usual
-        raise InputError(where, f"unknown column or unit {header[:60]!r}", text)
-    quantity = f"s_{known}" if name.startswith("sigma_") else name
-    if known in PRIMED and unit is not None and unit in _NO_UNIT and unit != "":
-        return Column(header, quantity, 1.0, primed=True)
-    if unit is None and "" not in units()[known]:
-        raise InputError(place, f"no unit for {name}", allowed_units(known))
-    if known == "value" and unit is not None and unit not in _NO_UNIT:
-        return Column(header, quantity, 1.0, unit=unit)
-    scale_to_si = factor(known, unit or "")
-    if scale_to_si is None:
-        raise InputError(place, f"unit {unit!r} for {name}", allowed_units(known))
-    return Column(header, quantity, scale_to_si)

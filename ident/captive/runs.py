@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -18,10 +17,11 @@ from ident.captive.deduction import thrust_deduction
 from ident.captive.dimensions import dimensional
 from ident.captive.foam_histories import foam_channels
 from ident.captive.grids import with_discretisation
+from ident.captive.harmonic_tables import cartesian, instants
 from ident.captive.histories import Reduced, reduce
 from ident.captive.left_behind import left_behind
 from ident.captive.moving import axes_of, moving_body, refuse_tables
-from ident.captive.oscillation import Oscillation, states
+from ident.captive.oscillation import states
 from ident.captive.quantities import Column, owner
 from ident.captive.readers.opening import matching, on_coarser_grids, open_sheet, reader_of
 from ident.captive.readers.sheet import Sheet
@@ -199,10 +199,10 @@ def _from_table(
         out = off_table(out, taken, off, source, header, sheet)
     if source.reduction is None:
         return out
-    out = _cartesian(out, where)
+    out = cartesian(out, where)
     standing = any(out[k].fillna(0.0).ne(0.0).any() for k in ("alpha", "beta") if k in out)
     refuse_tables(source, header, standing, where)
-    return _spread(out, source, header, str(path))
+    return instants(out, source, header, str(path), where)
 
 
 def _beside_numbers(columns: dict[str, Any], read: Cells, primed: set[str], sheet: Sheet, uses: Uses) -> set[str]:
@@ -219,34 +219,6 @@ def _beside_numbers(columns: dict[str, Any], read: Cells, primed: set[str], shee
     return {name for name in read.errors if name.removeprefix("s_") in primed}
 
 
-def _cartesian(table: pd.DataFrame, where: str) -> pd.DataFrame:
-    """Amplitudes and phases of harmonics as parts in phase and in quadrature with the displacement.
-
-    A sin(k w t + phase) = A cos(phase) sin(k w t) + A sin(phase) cos(k w t); a lag is a phase behind.
-
-    Raises
-    ------
-    InputError
-        For an amplitude without one of phase and lag, or beside parts of the same harmonic.
-    """
-    out = table
-    for output, k in itertools.product(OUTPUTS, ("", "2", "3")):
-        names = {kind: f"{output}_{kind}{k}" for kind in ("amp", "phase", "lag", "in", "out")}
-        given = {kind for kind, name in names.items() if name in out}
-        if not given & {"amp", "phase", "lag"}:
-            continue
-        if given not in ({"amp", "phase"}, {"amp", "lag"}):
-            wrong = " ".join(sorted(names[kind] for kind in given))
-            text = (
-                f"{names['amp']} with one of {names['phase']} (ahead of the displacement) and {names['lag']} (behind)"
-            )
-            raise InputError(f"{where}, key source.columns", wrong, text)
-        phase = out[names["phase"]] if "phase" in given else -out[names["lag"]]
-        parts = {names["in"]: out[names["amp"]] * np.cos(phase), names["out"]: out[names["amp"]] * np.sin(phase)}
-        out = out.drop(columns=[names[kind] for kind in given]).assign(**parts)
-    return out
-
-
 def _of_values(source: Source) -> tuple[str, float, float]:
     """How published values of a source were made dimensionless: name, area and length [SI] where stated."""
     stated = source.reference
@@ -260,18 +232,6 @@ def _required(sheet: Sheet, columns: set[str], source: Source) -> None:
         if name not in columns and name not in optional:
             text = f"columns {', '.join(REQUIRED)} and quantities"
             raise InputError(str(sheet.path), f"column {name} missing", text)
-
-
-def _spread(table: pd.DataFrame, source: Source, header: CampaignFile, where: str) -> pd.DataFrame:
-    """Rows of harmonics to the four states of each oscillation."""
-    assert source.reduction is not None
-    frame, ittc = header.frame.frame, header.frame.angles == "ittc"
-    instants = []
-    for run in table.to_dict("records"):
-        place = f"{where}, row {run['row']}"
-        one = Oscillation.of_row({str(k): v for k, v in run.items()})
-        instants += states(one, source.reduction, frame, ittc, place)
-    return pd.DataFrame(instants)
 
 
 def _from_histories(
@@ -365,7 +325,9 @@ def _channels(
         for block in sheet.numbers(positions, clock):
             yield block @ matrix if taken else block * factors
 
-    gaps = {k.quantity: tuple(m * f for m in source.missing) for (_, k), f in zip(wanted, factors, strict=False)}
+    gaps = {
+        k.quantity: tuple(m * f for m in source.missing_numbers) for (_, k), f in zip(wanted, factors, strict=False)
+    }
     others = [c for c in channels if c != "time"]
     moving = moving_body(others, source, header, numbers, source.moments_about or "body", where)
     yield "", Channels(path, channels, pieces, sheet.first_row, gaps, moving)

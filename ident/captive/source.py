@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Annotated, Literal, get_args
 
 from pydantic import Field, field_validator, model_validator
@@ -58,6 +59,7 @@ LOOKED_AT = {
     "openfoam": _FOAM_KEYS,
 }
 NO_COLUMNS = "no subtract: a function object of the patches that are wanted, OpenFOAM's files have no other columns"
+_NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d{1,3})?", re.ASCII)
 Vector = Annotated[list[float], Field(min_length=3, max_length=3)]
 Positive = Annotated[float, Field(gt=0, le=1e9)]
 Span = Annotated[list[float], Field(min_length=2, max_length=2)]
@@ -223,7 +225,7 @@ class Source(Data):
     axes : Axes of these files' loads, where they are not as ``[frame]`` says: ``body``, ``flow`` or ``tank``.
     moments_about : A point that moves with the ``body`` or stays ``fixed``, where the body moves in its axes.
     factor : Header or quantity -> what its values are multiplied by, where the header does not say it.
-    missing : Numbers that stand for a value that was not measured.
+    missing : Numbers and words that stand for a value that was not measured: ``-9999``, ``"NaN"``, ``""`` for blanks.
     words : Words of the files -> those of this program.
     plus_minus : How many standard errors an error behind a plus-minus sign is: 1.96 for 95 % limits. Without
         it they are read as one, and ``ident check`` says so.
@@ -263,7 +265,9 @@ class Source(Data):
     axes: Literal["", "body", "flow", "tank"] = ""
     moments_about: Literal["", "body", "fixed"] = ""
     factor: dict[str, Annotated[float, Field(ge=-1e9, le=1e9)]] = Field(default_factory=dict)
-    missing: Annotated[list[float], Field(max_length=20)] = Field(default_factory=list)
+    missing: Annotated[list[float | Annotated[str, Field(max_length=40)]], Field(max_length=20)] = Field(
+        default_factory=list
+    )
     words: dict[str, str] = Field(default_factory=dict)
     plus_minus: Annotated[float, Field(gt=0, le=10)] | None = None
     marks: Annotated[dict[Annotated[str, Field(min_length=1, max_length=5)], str], Field(max_length=20)] = Field(
@@ -296,6 +300,16 @@ class Source(Data):
             if not low < high:
                 raise ValueError(f"{name} = [lowest, highest], the first below the second")
         return within
+
+    @property
+    def missing_numbers(self) -> tuple[float, ...]:
+        """Those of ``missing`` that are numbers, whether they stand there as numbers or as text."""
+        return tuple(float(m) for m in self.missing if not isinstance(m, str) or _NUMBER.fullmatch(m.strip()))
+
+    @property
+    def missing_words(self) -> frozenset[str]:
+        """Those of ``missing`` that are words; the empty one is a blank cell."""
+        return frozenset(m.strip() for m in self.missing if isinstance(m, str))
 
     @field_validator("factor")
     @classmethod

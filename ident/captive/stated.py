@@ -8,9 +8,10 @@ from typing import Any
 
 import pandas as pd
 
+from ident.captive.headers import column
 from ident.captive.other_loads import quantity_of
 from ident.captive.patterns import search
-from ident.captive.quantities import column, owner, suffixed
+from ident.captive.quantities import owner, suffixed
 from ident.captive.readers.text import Dialect
 from ident.captive.run_table import DIRECT, STATES, TEXT
 from ident.captive.source import Source
@@ -24,8 +25,8 @@ _PLAIN = Dialect()
 _SLACK = 1e-9
 
 
-# Signs and decimal points as file names have them: m08, p08, n4, 04p5, 4,5.
-_IN_NAMES = re.compile(r"(?P<sign>[mpnMPN+-]?)(?P<whole>\d+)(?:[pP,](?P<part>\d+))?")
+# Signs and decimal points as file names have them: m08, p08, n4, neg4, plus4, 04p5, 4,5, 0d5 (which is no 0e5).
+_IN_NAMES = re.compile(r"(?P<sign>[mpnMPN+-]?|[Mm]inus|[Pp]lus|[Nn]eg|[Pp]os)_?(?P<whole>\d+)(?:[pPdD,](?P<part>\d+))?")
 
 
 def outside_excluded(table: pd.DataFrame, source: Source, where: str) -> pd.DataFrame:
@@ -137,7 +138,7 @@ def _of_name(key: str, text: str, before: str, where: str) -> str:
     hit = _IN_NAMES.fullmatch(text)
     if hit is None:
         return text
-    sign = "-" if hit["sign"] in tuple("mMnN-") else ""
+    sign = "-" if hit["sign"] and hit["sign"][0] in "mMnN-" else ""
     return f"{sign}{hit['whole']}" + (f".{hit['part']}" if hit["part"] else "")
 
 

@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 
 from ident.captive.campaign_file import CampaignFile
 from ident.captive.dimensions import dimensional
-from ident.captive.quantities import TAKEN, Column, column, owner
+from ident.captive.headers import column
+from ident.captive.quantities import TAKEN, Column, owner
 from ident.captive.readers.sheet import Sheet
 from ident.captive.readers.sheet_columns import position
 from ident.captive.source import Source, Subtract
@@ -69,7 +70,9 @@ def taken_columns(sheet: Sheet, source: Source, header: CampaignFile, totals: se
         kinds = {}
         for name, declared in one.columns.items():
             at = position(sheet, name)
-            kinds[at] = column(sheet.header[at], declared, sheet.where, factored=one.factor != 1.0)
+            kinds[at] = column(
+                sheet.header[at], declared, sheet.where, sheet.header[at : at + 1] if one.factor != 1.0 else ()
+            )
             if owner(kinds[at].quantity) not in OUTPUTS or kinds[at].quantity.startswith("s_"):
                 raise InputError(f"{place}.columns.{name[:60]}", repr(declared), f"a load: {' '.join(OUTPUTS)}")
         given = {kind.quantity for kind in kinds.values()}

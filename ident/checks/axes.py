@@ -60,23 +60,35 @@ def along_the_flow(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
 
 @check("hydrostatic")
 def weight_in_the_loads(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
-    """Z of a body at zero incidence as large as a part of its weight, and no load a boat has there."""
+    """Z or M of a body at zero incidence as large as a part of its weight, and no load a boat has there."""
     body = evidence.body
     if body is None or body.mass is None:
         return
     weight = body.mass * rule.limits["gravity"]
-    hull = evidence.runs["part"].isin(HULL)
-    # What the two sides of an oscillation have in common stands still in it.
-    swung = hull & evidence.runs["run_id"].astype(str).str.contains(r"[+-][av]$")
-    runs = evidence.runs[(_still(evidence.runs) | swung) & kept(evidence.runs, "Z")]
-    level = runs["alpha"].fillna(0.0).abs() < math.radians(rule.limits["level"])
-    for file, group in runs[level].groupby(together(runs[level]), sort=False):
-        z = prime(group, "Z", body)
-        share = float(group["Z"].abs().median() / weight)
-        if share > rule.limits["share"] and float(z.abs().median()) > rule.limits["prime"]:
-            what = f"Z = {group['Z'].median():.4g} N without incidence, {100 * share:.3g} % of the displaced weight "
-            what += f"({weight:.4g} N) and {float(z.abs().median()):.2g} in prime form: buoyancy or weight in the loads"
-            yield rule.finding(str(file), rows_of(group), ["Z", "M"], what)
+    level = evidence.runs["alpha"].fillna(0.0).abs() < math.radians(rule.limits["level"])
+    for load, whole, share_limit, prime_limit, words in (
+        ("Z", weight, "share", "prime", f"the displaced weight ({weight:.4g} N)"),
+        ("M", weight * body.length, "moment_share", "moment_prime", "the displaced weight times the length"),
+    ):
+        runs = _standing(evidence.runs[level & kept(evidence.runs, load)], load)
+        for file, group in runs.groupby(together(runs), sort=False):
+            size = float(prime(group, load, body).abs().median())
+            share = float(group[load].abs().median() / whole)
+            if share > rule.limits[share_limit] and size > rule.limits[prime_limit]:
+                unit = "N" if load == "Z" else "N m"
+                what = f"{load} = {group[load].median():.4g} {unit} without incidence, {100 * share:.3g} % of {words} "
+                what += f"and {size:.2g} in prime form: buoyancy or weight in the loads"
+                yield rule.finding(str(file), rows_of(group), ["Z", "M"], what)
+
+
+def _standing(runs: pd.DataFrame, load: str) -> pd.DataFrame:
+    """Runs of the hull at rest in a steady flow, and for each two sides of an oscillation what they have in common."""
+    phases = runs["run_id"].astype(str).str.extract(r"^(?P<cycle>.*)[+-](?P<side>[av])$")
+    swung = phases["cycle"].notna() & runs["part"].isin(HULL)
+    sides = runs[swung].groupby([together(runs)[swung], phases["cycle"][swung], phases["side"][swung]], sort=False)
+    common = sides[load].transform("mean").where(sides[load].transform("size") == 2)
+    both = runs[swung].assign(**{load: common})
+    return pd.concat([runs[_still(runs) & ~swung], both[common.notna()]])
 
 
 @check("propeller_on")

@@ -39,6 +39,16 @@ def replaced_clocks(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
 
 
 @check("time")
+def gaps_of_clocks(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
+    """Histories whose clock leaps over a time without samples."""
+    for one in evidence.histories:
+        if one.clock is not None and one.rate_hz is None and one.clock.gaps:
+            rows = [k + one.first_row for k in one.clock.gap]
+            what = f"time leaps {one.clock.gaps} times, by {one.clock.longest:.4g} s at the most: no samples are there"
+            yield rule.finding(one.file, rows, ["time"], what, "warning")
+
+
+@check("time")
 def refused_clocks(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
     """Histories that were not reduced because their stamps do not rise and nothing stands in for them."""
     for one in evidence.campaign.refused if evidence.campaign else ():
@@ -136,6 +146,16 @@ def another_frequency(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
             yield rule.finding(one.file, [], [name], what)
 
 
+@check("motion")
+def a_phase_that_nothing_says(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
+    """Oscillations whose displacement is not measured, and whose phase at time zero is not stated."""
+    for one in evidence.histories:
+        if one.phase_taken:
+            what = f"run {one.run_id}: nothing measures or states the phase of the displacement, taken as zero at time "
+            what += "zero: what it is off by turns damping into added mass"
+            yield rule.finding(one.file, [], ["time"], what)
+
+
 @check("delay")
 def behind_the_motion(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
     """Loads and measured rates that come behind the displacement by more than is stated."""
@@ -156,13 +176,13 @@ def point_that_may_stay(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
     for one in evidence.histories:
         for arm in one.left_behind:
             verdict = arm.verdict(rule.limits["errors"])
-            if abs(arm.in_phase) <= rule.limits["share"] * arm.swing or verdict == "goes":
+            if abs(arm.in_phase) <= rule.limits["share"] * arm.own or verdict == "goes":
                 continue
             what = f"a moment point that stays while the body moves in {arm.motion} puts {arm.force} times the "
-            what += f"displacement into {arm.moment}, {abs(arm.in_phase):.3g} N m of {arm.swing:.3g}; "
+            what += f"displacement into {arm.moment} in phase, {abs(arm.in_phase):.3g} N m beside {arm.own:.3g}; "
             if verdict:
                 what += f"its third harmonic says that it does: {arm.shown:.3g} of {arm.third:.3g} N m"
             else:
                 what += "nothing says that it goes along, and the record does not show it"
-            asked = "warning" if abs(arm.in_phase) > rule.limits["asked"] * arm.swing else "info"
+            asked = "warning" if abs(arm.in_phase) > rule.limits["asked"] * arm.own else "info"
             yield rule.finding(one.file, [], [arm.moment], what, "" if verdict else asked)

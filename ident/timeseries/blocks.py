@@ -13,6 +13,8 @@ from collections.abc import Callable, Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from ident.timeseries.clock import gap_before
+
 Array = NDArray[np.float64]
 # Times (n,) -> columns (n, p).
 Regressors = Callable[[Array], Array]
@@ -68,6 +70,10 @@ class Condensed:
         if self._last is None:
             step[0] = step[1]
         self._last = float(time[-1])
+        # The sample behind a gap does not stand for it.
+        gap = gap_before(step)
+        if gap.any():
+            step[gap] = np.median(step[~gap])
         if bad.any():
             step, time, values = step[~bad], time[~bad], values[~bad]
         sample = np.column_stack([time, self.regressors(time), values])

@@ -1,4 +1,4 @@
-"""Time stamps of a history in bounded memory: which repeat, which step back."""
+"""Time stamps of a history in bounded memory: which repeat, which step back, which leave a gap."""
 
 from __future__ import annotations
 
@@ -12,6 +12,20 @@ Array = NDArray[np.float64]
 # Rows that are remembered of each fault, and stamps around the first repeat that are looked at.
 _ROWS = 1000
 _AROUND = 100
+# A step that is longer than its neighbours by this factor is a gap.
+_WIDE = 50.0
+
+
+def gap_before(step: Array) -> NDArray[np.bool_]:
+    """Whether each step is alone, and longer than its neighbours and the usual one by a factor of fifty.
+
+    No sample is there. A time step that a solver adapts grows from one to the next by less.
+    """
+    steps = np.where(np.isfinite(step), step, 0.0)
+    usual = float(np.median(steps[steps > 0.0])) if (steps > 0.0).any() else 0.0
+    before, behind = np.concatenate([[0.0], steps[:-1]]), np.concatenate([steps[1:], [0.0]])
+    beside = np.maximum(before, behind)
+    return np.asarray((beside > 0.0) & (steps > _WIDE * np.maximum(beside, usual)))
 
 
 @dataclass
@@ -27,6 +41,7 @@ class Clock:
         are no finite number; the first thousand of each.
     repeats, backs, bads : How many there are.
     at_repeat, at_back : The first stamp that repeats; the first step back, from and to [s].
+    gap, gaps : Positions of stamps behind a gap, as ``gap_before``; how many there are.
     around : Stamps around the first repeat, for the digits they are written with.
     """
 
@@ -37,6 +52,8 @@ class Clock:
     repeat: list[int] = field(default_factory=list)
     back: list[int] = field(default_factory=list)
     bad: list[int] = field(default_factory=list)
+    gap: list[int] = field(default_factory=list)
+    gaps: int = 0
     repeats: int = 0
     backs: int = 0
     bads: int = 0
@@ -69,6 +86,9 @@ class Clock:
         self.repeats += same.size
         self._note(self.back, place[back])
         self._note(self.repeat, place[same])
+        wide = np.flatnonzero(gap_before(step))
+        self.gaps += wide.size
+        self._note(self.gap, place[wide])
         if stamps.size:
             self.longest = max(self.longest, float(np.nanmax(step, initial=0.0)))
             self.first = float(stamps[0]) if math.isnan(self.first) else self.first

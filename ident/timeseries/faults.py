@@ -4,8 +4,9 @@ A first reading of a history learns what its channels are like (``Usual``), a se
 samples that are not (``Usual.faults``). Both are in bounded memory. A sample is left out with all
 of its channels, and counted by channel and kind; nothing is put in its place.
 
-* **sentinel**: a stated value (``missing``), or one written with nines only (-999, 9999, ...) far
-  outside of all others: what loggers write where they have nothing.
+* **sentinel**: a stated value or word (``missing``), one written with nines only (-999, 9999, ...) or the end of
+  an integer's range far outside of all others, or one value that stands often and far from all others: what
+  loggers write where they have nothing.
 * **spike**: at most three samples far outside of 98 % of the record, with neighbours inside on both
   sides. What stands at the start of a record is the start-up transient's, and not looked at.
 * **stuck**: one value for longer than chance repeats it, while the steps around it are larger than
@@ -41,7 +42,9 @@ _CHANCE = 1e-6
 _AROUND = 20
 _DIGITS = 5.0
 # Values with nines only stand outside of all others by this factor.
-_BEYOND = 3.0
+BEYOND = 3.0
+# -999.25 of well logs, and the ends of 16 and 32 bits.
+_KNOWN = (999.25, 32767.0, 32768.0, 65535.0, 2147483647.0, 2147483648.0)
 # Clipped: the extreme value stands so many times, and so many times as often as the next.
 _CLIPPED = 10
 _OFTEN = 5.0
@@ -51,9 +54,9 @@ _ROUNDED = 2.0**33
 _NINES = re.compile(r"9{3,}0*")
 
 
-def _nines(value: float) -> bool:
-    """Whether a number is written with three nines or more and nothing else."""
-    return bool(_NINES.fullmatch(f"{abs(value):.10g}".replace(".", "").lstrip("0")))
+def sentinel(value: float) -> bool:
+    """Whether loggers write a number where they have nothing: three nines or more and nothing else, -999.25, -32768."""
+    return abs(value) in _KNOWN or bool(_NINES.fullmatch(f"{abs(value):.10g}".replace(".", "").lstrip("0")))
 
 
 @dataclass
@@ -95,6 +98,7 @@ class _Channel:
     digit: float = 0.0
     longest: int = 1 << 60
     sentinels: tuple[float, ...] = ()
+    often: tuple[float, ...] = ()
     clipped: str = ""
     # How often the limit stands, and whether far from all other values: a dropout, nothing is cut off there.
     at_limit: int = 0
@@ -143,7 +147,10 @@ class Usual:
         bad = np.zeros(len(values), dtype=bool)
         for c, (name, channel) in enumerate(zip(self.names, self._channels, strict=True)):
             column = whole[:, c]
-            marks = {"sentinel": np.isin(column, channel.sentinels)} if channel.sentinels else {}
+            nothing = np.isnan(column)
+            marks = (
+                {"sentinel": nothing | np.isin(column, channel.sentinels)} if channel.sentinels or nothing.any() else {}
+            )
             known = marks.get("sentinel", np.zeros(len(column), dtype=bool))
             outside = ((column < channel.low) | (column > channel.high)) & ~known
             if outside.any():
@@ -151,6 +158,9 @@ class Usual:
                 known = known | marks["spike"]
             if len(column) > channel.longest:
                 marks["stuck"] = _stuck(column, channel) & ~known
+                known = known | marks["stuck"]
+            if channel.often:
+                marks["sentinel"] = marks.get("sentinel", False) | (np.isin(column, channel.often) & ~known)
             for kind, mark in marks.items():
                 faulty = mark[inside]
                 if faulty.any():
@@ -199,6 +209,9 @@ class _Learning:
         self.ends = (_Extreme(1.0), _Extreme(-1.0))
 
     def feed(self, values: Array) -> None:
+        values = values[~np.isnan(values)]
+        if not values.size:
+            return
         start = -self.count % self.stride
         self.kept = np.concatenate([self.kept, values[start :: self.stride]])
         while self.kept.size > _KEPT:
@@ -216,18 +229,28 @@ class _Learning:
         size = float(np.abs(values).max())
         if size >= 99.0:
             for value in np.unique(values[np.abs(values) >= 99.0])[[0, -1]]:
-                if _nines(float(value)):
+                if sentinel(float(value)):
                     self.nines[float(value)] += int((values == value).sum())
         for end in self.ends:
             end.feed(values)
 
+    def _alone(self, end: _Extreme) -> bool:
+        """Whether one value stands often, and further from all others than they are apart."""
+        other = self.ends[1] if end is self.ends[0] else self.ends[0]
+        apart, spread = end.first - end.second, end.second + other.first
+        return end.firsts >= _CLIPPED and end.seconds > 0 and spread > 0.0 and apart > _FAR * spread
+
     def result(self, name: str, stated: Sequence[float]) -> _Channel:
         channel = _Channel(digit=self.digit if math.isfinite(self.digit) else 0.0)
-        kept = self.kept[~np.isin(self.kept, (*stated, *self.nines))]
+        if not self.count:
+            return channel
+        often = [end.sign * end.first for end in self.ends if self._alone(end)]
+        kept = self.kept[~np.isin(self.kept, (*stated, *self.nines, *often))]
         kept = kept if kept.size else self.kept
         low, high = (float(np.quantile(kept, q)) for q in _QUANTILES)
         size = max(abs(low), abs(high))
-        channel.sentinels = (*stated, *(v for v in self.nines if abs(v) > _BEYOND * size))
+        channel.sentinels = (*stated, *(v for v in self.nines if abs(v) > BEYOND * size))
+        channel.often = tuple(often)
         room = max(_FAR * (high - low), 0.01 * size)
         if size > 0.0 and self.count > _AROUND:
             channel.low, channel.high = low - room, high + room

@@ -10,9 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ident.captive.patterns import search
 from ident.captive.quantities import owner, split, suffixed
-from ident.captive.readers.sheet import Sheet, once
-from ident.captive.readers.text import LARGEST, Dialect
+from ident.captive.readers.sheet import Sheet, ignored, once
+from ident.captive.readers.text import LARGEST, Dialect, odd
 from ident.captive.readers.times import Clocks
 from ident.captive.source import Source
 from sim.files.errors import InputError
@@ -67,6 +68,50 @@ def chosen(path: Path, names: Sequence[str], source: Source, what: str) -> str:
     return names[0]
 
 
+def of_one_length(path: Path, columns: dict[str, Any], source: Source) -> dict[str, Any]:
+    """The columns of the most values; a single value that is a quantity with its unit stands in every row.
+
+    Parameters
+    ----------
+    path : For the message.
+    columns : Header -> values.
+    source : What it declares or ignores.
+
+    Raises
+    ------
+    InputError
+        For a quantity with another number of values, or one with imaginary parts: neither is passed over.
+    """
+    longest = max((len(v) for v in columns.values()), default=0)
+    kept: dict[str, Any] = {}
+    for name, values in columns.items():
+        meant = _is_quantity(name, source)
+        if isinstance(values, np.ndarray) and values.dtype.kind == "c":
+            if meant and np.abs(values.imag).max(initial=0.0) > 0.0:
+                raise InputError(f"{path}, {name[:60]}", "complex numbers", "the real ones of a time history")
+            values = values.real
+        if len(values) == longest:
+            kept[name] = values
+        elif ignored(name, source):
+            # What is left out is still there to be named.
+            kept[name] = np.full(longest, np.nan)
+        elif meant and len(values) == 1:
+            kept[name] = np.repeat(values, longest)
+        elif meant:
+            text = f'columns of one length; ignore = ["{name[:40]}"] in [[source]] leaves one out'
+            raise InputError(f"{path}, {name[:60]}", f"{len(values)} values, and others {longest}", text)
+    return kept
+
+
+def _is_quantity(name: str, source: Source) -> bool:
+    """Whether a column is declared, or has the name of a quantity with its unit."""
+    bare, unit = split(name)
+    if ignored(name, source):
+        return False
+    declared = name in source.columns or bare in source.columns or any(search(p, name) for p in source.patterns)
+    return declared or name in suffixed() or (unit is not None and bool(owner(bare.rstrip("'"))))
+
+
 def array_sheet(
     path: Path, names: Sequence[str], columns: Sequence[Any], source: Source, rows: Sequence[int] | int = 1
 ) -> Sheet:
@@ -95,6 +140,7 @@ def array_sheet(
                     header[i],
                     columns[i][at : at + _BLOCK],
                     clocks if i == clock else None,
+                    source,
                 )
                 for i in wanted
             ]
@@ -122,8 +168,9 @@ def _written(cell: Any) -> str:
     return str(cell)
 
 
-def _numbers(path: Path, rows: Sequence[int], name: str, cells: Any, clocks: Clocks | None) -> Array:
-    """One column of some rows as finite numbers."""
+def _numbers(path: Path, rows: Sequence[int], name: str, cells: Any, clocks: Clocks | None, source: Source) -> Array:
+    """One column of some rows as finite numbers; NaN where one is stated to be missing, but for a clock."""
+    lost = np.zeros(len(cells), dtype=bool)
     if isinstance(cells, np.ndarray) and cells.dtype.kind in "iuf":
         values = cells.astype(float)
     else:
@@ -135,10 +182,25 @@ def _numbers(path: Path, rows: Sequence[int], name: str, cells: Any, clocks: Clo
                 number = clocks.seconds(text)
             read.append(np.nan if number is None else number)
         values = np.array(read, dtype=float)
-    bad = np.flatnonzero(~(np.abs(values) <= LARGEST))
+        lost = np.array([_written(cell).strip() in source.missing_words for cell in cells], dtype=bool)
+    if clocks is None:
+        values, lost = without_missing(values, lost, source)
+    bad = np.flatnonzero(~(np.abs(values) <= LARGEST) & ~lost)
     if bad.size:
         at = int(bad[0])
         place = f"{path}, row {rows[at]}, column {name[:60]}"
         shown = _written(cells[at]) or "nothing"
-        raise InputError(place, repr(shown[:60]), f"a finite number of at most {LARGEST:g}")
+        word = "NaN" if isinstance(cells, np.ndarray) and np.isnan(values[at]) else _written(cells[at])
+        text = f"a finite number of at most {LARGEST:g}{odd(word)}"
+        raise InputError(place, repr(shown[:60]), text)
     return values
+
+
+def without_missing(values: Array, lost: NDArray[np.bool_], source: Source) -> tuple[Array, NDArray[np.bool_]]:
+    """Values with NaN where nothing was measured, and where that is: ``missing = ["NaN"]`` says that NaN does."""
+    stated = source.missing_numbers
+    if any(abs(m) > LARGEST for m in stated):
+        lost = lost | np.isin(values, stated)
+    if any(word.lower() == "nan" for word in source.missing_words):
+        lost = lost | np.isnan(values)
+    return np.where(lost, np.nan, values), lost

@@ -7,10 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from ident.captive.readers.arrays import array_sheet, chosen, needs, with_units
+from ident.captive.readers.arrays import array_sheet, chosen, needs, of_one_length, with_units
 from ident.captive.readers.sheet import Sheet
 from ident.captive.source import Source
 from sim.files.errors import InputError
+
+# Attributes by which HDF5 links datasets, which are no words or numbers.
+_OF_STRUCTURE = ("DIMENSION_LIST", "REFERENCE_LIST")
 
 
 def _text(value: Any) -> str:
@@ -42,11 +45,31 @@ def open_hdf5(path: Path, source: Source) -> Sheet:
     except (OSError, RuntimeError, KeyError, ValueError) as error:
         raise InputError(str(path), f"not an HDF5 file: {str(error)[:100]}", "a whole file") from error
     name = chosen(path, list(groups), source, "group")
-    vectors = groups[name]
-    longest = max(len(v) for v, _ in vectors.values())
-    vectors = {k: v for k, v in vectors.items() if len(v[0]) == longest}
+    return _sheet(path, groups[name], source)
+
+
+def _sheet(path: Path, vectors: dict[str, tuple[np.ndarray, str]], source: Source) -> Sheet:
     header = with_units(list(vectors), [u for _, u in vectors.values()], source)
-    return array_sheet(path, header, [v for v, _ in vectors.values()], source)
+    columns = of_one_length(path, dict(zip(header, (v for v, _ in vectors.values()), strict=True)), source)
+    return array_sheet(path, list(columns), list(columns.values()), source)
+
+
+def unpacked(values: np.ndarray, attributes: Any) -> np.ndarray:
+    """Values as the conventions for climate and forecast pack them: times ``scale_factor`` plus ``add_offset``.
+
+    ``_FillValue`` and ``missing_value`` stand for nothing measured, and become NaN.
+    """
+    if values.dtype.kind not in "iuf":
+        return values
+    blank = np.zeros(values.shape, dtype=bool)
+    for key in ("_FillValue", "missing_value"):
+        for one in np.ravel(attributes.get(key, [])):
+            blank |= values == one
+    made = values
+    for key, change in (("scale_factor", np.multiply), ("add_offset", np.add)):
+        if key in attributes:
+            made = change(made.astype(float), float(np.ravel(attributes[key])[0]))
+    return np.where(blank, np.nan, made.astype(float)) if blank.any() else made
 
 
 def _collect(h5py: Any, group: Any, name: str, groups: dict[str, Any], source: Source) -> None:
@@ -58,23 +81,24 @@ def _collect(h5py: Any, group: Any, name: str, groups: dict[str, Any], source: S
             if not key.startswith("#"):
                 _collect(h5py, item, path, groups, source)
             continue
-        stated = unit(_text(item.attrs.get("units", item.attrs.get("unit", ""))))
+        attributes = {str(k): v for k, v in item.attrs.items() if k not in _OF_STRUCTURE}
+        stated = unit(_text(next((v for k, v in attributes.items() if k.lower() in ("units", "unit")), "")))
         if item.dtype.names:
             table = item[()]
             groups[path] = {n: (np.asarray(table[n]).ravel(), "") for n in item.dtype.names if table[n].ndim == 1}
-        elif item.ndim == 1 or (item.ndim == 2 and 1 in item.shape):
-            if item.size > 1 and item.dtype.kind in "iufSUO":
-                values = np.ravel(item[()])
+        elif item.ndim <= 1 or (item.ndim == 2 and 1 in item.shape):
+            if item.size and item.dtype.kind in "iufcSUO":
+                values = unpacked(np.ravel(item[()]), attributes)
                 text = item.dtype.kind in "SUO"
                 vectors[key] = (np.array([_text(v) for v in values], dtype=object) if text else values, stated)
         elif item.ndim == 2 and item.dtype.kind in "iuf":
             labels = source.names or [_text(v) for v in np.ravel(item.attrs.get("columns", []))]
-            values = item[()]
+            values = unpacked(item[()], attributes)
             # MATLAB stores its columns as rows.
             values = values if len(labels) == values.shape[1] else values.T
             if len(labels) == values.shape[1]:
                 groups[path] = {str(n): (values[:, i], "") for i, n in enumerate(labels)}
-    if vectors:
+    if any(len(v) > 1 for v, _ in vectors.values()):
         groups[name or "/"] = vectors
 
 
@@ -94,15 +118,12 @@ def open_netcdf(path: Path, source: Source) -> Sheet:
     try:
         with netcdf_file(str(path), "r", mmap=False) as opened:
             vectors = {
-                str(k): (np.array(v[:], dtype=float), unit(_text(getattr(v, "units", ""))))
+                str(k): (unpacked(np.atleast_1d(np.array(v[...])), v._attributes), unit(_text(getattr(v, "units", ""))))
                 for k, v in opened.variables.items()
-                if v[:].ndim == 1 and v[:].dtype.kind in "iuf" and v[:].size > 1
+                if np.array(v[...]).ndim <= 1 and np.array(v[...]).dtype.kind in "iuf" and np.array(v[...]).size
             }
     except (OSError, ValueError, TypeError, IndexError, KeyError) as error:
         raise InputError(str(path), f"not a netCDF file: {str(error)[:100]}", "a whole file") from error
-    if not vectors:
+    if not any(len(v) > 1 for v, _ in vectors.values()):
         raise InputError(str(path), "no variables of one dimension", "variables of one length")
-    longest = max(len(v) for v, _ in vectors.values())
-    vectors = {k: v for k, v in vectors.items() if len(v[0]) == longest}
-    header = with_units(list(vectors), [u for _, u in vectors.values()], source)
-    return array_sheet(path, header, [v for v, _ in vectors.values()], source)
+    return _sheet(path, vectors, source)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ident.captive.readers.arrays import array_sheet, chosen, needs, with_units
+from ident.captive.readers.arrays import array_sheet, chosen, needs, of_one_length, with_units
 from ident.captive.readers.sheet import Sheet
 from ident.captive.readers.table import open_csv
 from ident.captive.readers.text import head
@@ -32,21 +32,22 @@ def open_tdms(path: Path, source: Source) -> Sheet:
     try:
         with nptdms.TdmsFile.open(str(path)) as opened:
             groups = {
-                g.name: {c.name: (np.asarray(c[:]), dict(c.properties)) for c in g.channels() if len(c) > 1}
+                g.name: {c.name: (np.asarray(c[:]), dict(c.properties)) for c in g.channels() if len(c)}
                 for g in opened.groups()
             }
     except (ValueError, OSError, KeyError, EOFError, TypeError, IndexError) as error:
         raise InputError(str(path), f"not a TDMS file: {str(error)[:100]}", "a whole file") from error
-    name = chosen(path, [n for n, channels in groups.items() if channels], source, "group")
+    filled = [n for n, channels in groups.items() if any(len(v) > 1 for v, _ in channels.values())]
+    name = chosen(path, filled, source, "group")
     channels = groups[name]
-    longest = max(len(v) for v, _ in channels.values())
-    channels = {k: c for k, c in channels.items() if len(c[0]) == longest}
-    header = with_units(list(channels), [str(p.get("unit_string", "")) for _, p in channels.values()], source)
-    columns = [v for v, _ in channels.values()]
+    named = with_units(list(channels), [_unit(p) for _, p in channels.values()], source)
+    whole = of_one_length(path, dict(zip(named, (v for v, _ in channels.values()), strict=True)), source)
+    header, columns = list(whole), list(whole.values())
+    longest = len(columns[0])
     waves = {
         (float(p.get("wf_start_offset", 0.0)), float(p["wf_increment"]))
-        for _, p in channels.values()
-        if p.get("wf_increment")
+        for v, p in channels.values()
+        if p.get("wf_increment") and len(v) == longest
     }
     if waves and not any(re.match(r"(?i)time\b", h) for h in header) and "time" not in source.columns.values():
         if len(waves) > 1:
@@ -56,6 +57,11 @@ def open_tdms(path: Path, source: Source) -> Sheet:
         offset, step = waves.pop()
         header, columns = ["time [s]", *header], [offset + step * np.arange(longest), *columns]
     return array_sheet(path, header, columns, source)
+
+
+def _unit(properties: dict[str, object]) -> str:
+    """The unit of a channel, under either of the names that LabVIEW gives it."""
+    return str(properties.get("unit_string") or properties.get("NI_UnitDescription") or "")
 
 
 def open_lvm(path: Path, source: Source) -> Sheet:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ident.captive.readers.arrays import array_sheet, chosen
+from ident.captive.readers.arrays import array_sheet, chosen, of_one_length
 from ident.captive.readers.hdf5 import open_hdf5
 from ident.captive.readers.sheet import Sheet
 from ident.captive.source import Source
@@ -40,22 +40,11 @@ def open_matlab(path: Path, source: Source) -> Sheet:
     return from_variables(path, variables, source)
 
 
-def _fields(value: Any) -> dict[str, Any] | None:
-    names = getattr(value, "_fieldnames", None)
-    return {n: getattr(value, n) for n in names} if names else None
-
-
 def from_variables(path: Path, variables: dict[str, Any], source: Source) -> Sheet:
-    """Columns among named variables: vectors, structs of vectors, matrices."""
-    vectors = {k: np.ravel(v) for k, v in variables.items() if _vector(v)}
+    """Columns among named variables: vectors, structs of vectors (``run.data``, ``run(2)``), matrices."""
     groups: dict[str, dict[str, Any]] = {}
-    for name, value in variables.items():
-        fields = _fields(value) if not isinstance(value, dict) else value
-        inside = {k: np.ravel(v) for k, v in (fields or {}).items() if _vector(v)}
-        if inside:
-            groups[name] = inside
-        elif isinstance(value, np.ndarray) and value.ndim == 2 and value.dtype.kind in "iuf":
-            groups[name] = {str(i): column for i, column in enumerate(value.T)}
+    _collect("", variables, groups)
+    vectors = groups.pop("", {})
     if vectors and (not source.table or source.table not in groups):
         if source.table:
             chosen(path, [*groups], source, "variable")
@@ -68,14 +57,35 @@ def from_variables(path: Path, variables: dict[str, Any], source: Source) -> She
                 text = f"names = [...] in [[source]], one for each of its {len(columns)} columns"
                 raise InputError(f"{path}, variable {name}", f"a matrix and {len(source.names)} names", text)
             columns = dict(zip(source.names, columns.values(), strict=True))
-    longest = max((len(v) for v in columns.values()), default=0)
-    columns = {k: v for k, v in columns.items() if len(v) == longest}
+    columns = of_one_length(path, columns, source)
     if not columns:
         raise InputError(str(path), "no vectors", "vectors of one length, a struct of them, or a matrix with names")
     return array_sheet(path, list(columns), list(columns.values()), source)
 
 
-def _vector(value: Any) -> bool:
-    if not isinstance(value, np.ndarray) or value.size < 2 or value.dtype.kind not in "iufUSO":
+def _collect(name: str, value: Any, groups: dict[str, dict[str, Any]]) -> None:
+    """The groups of columns in a struct, by its path; a matrix, and each of an array of structs, is one of its own."""
+    names = getattr(value, "_fieldnames", None)
+    fields = value if isinstance(value, dict) else {n: getattr(value, n) for n in names} if names else None
+    if fields is not None:
+        columns = {k: np.ravel(v) for k, v in fields.items() if _is_column(v)}
+        if any(v.size > 1 for v in columns.values()):
+            groups[name] = columns
+        for key, inside in fields.items():
+            _collect(f"{name}.{key}".lstrip("."), inside, groups)
+    elif isinstance(value, np.ndarray) and value.ndim == 2 and 1 not in value.shape and value.dtype.kind in "iuf":
+        groups[name] = {str(i): column for i, column in enumerate(value.T)}
+    elif isinstance(value, np.ndarray) and value.dtype.kind == "O":
+        for i, inside in enumerate(np.ravel(value), start=1):
+            if getattr(inside, "_fieldnames", None):
+                _collect(f"{name}({i})", inside, groups)
+
+
+def _is_column(value: Any) -> bool:
+    """Whether a variable is a vector, or a single number."""
+    if isinstance(value, (int, float, complex, np.number)) and not isinstance(value, bool):
+        return True
+    if not isinstance(value, np.ndarray) or not value.size or value.dtype.kind not in "iufcUSO":
         return False
-    return value.ndim == 1 or (value.ndim == 2 and 1 in value.shape)
+    structs = value.dtype.kind == "O" and any(getattr(v, "_fieldnames", None) for v in np.ravel(value))
+    return not structs and (value.ndim <= 1 or (value.ndim == 2 and 1 in value.shape))

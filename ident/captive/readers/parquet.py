@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ident.captive.quantities import owner, split, suffixed
+from ident.captive.readers.arrays import without_missing
 from ident.captive.readers.sheet import Sheet, once
-from ident.captive.readers.text import LARGEST, Dialect
+from ident.captive.readers.text import LARGEST, Dialect, odd
 from ident.captive.source import Source
 from sim.files.errors import InputError
 
@@ -65,7 +66,11 @@ def open_parquet(path: Path, source: Source) -> Sheet:
 
     def values(wanted: list[int], clock: int = -1) -> Iterator[Array]:
         for row, batch in batches([names[i] for i in wanted]):
-            yield np.stack([_numbers(path, row, header[i], batch.column(names[i])) for i in wanted], axis=1)
+            stated = [source if i != clock else None for i in wanted]
+            read = [
+                _numbers(path, row, header[i], batch.column(names[i]), s) for i, s in zip(wanted, stated, strict=True)
+            ]
+            yield np.stack(read, axis=1)
 
     def cells() -> Iterator[tuple[int, list[str]]]:
         for row, batch in batches(names):
@@ -128,8 +133,8 @@ def _with_units(schema: Any, declared: set[str]) -> list[str]:
     return header
 
 
-def _numbers(path: Path, row: int, name: str, array: Any) -> Array:
-    """One column of a batch as finite numbers."""
+def _numbers(path: Path, row: int, name: str, array: Any, source: Source | None) -> Array:
+    """One column of a batch as finite numbers; NaN where ``source`` states one to be missing."""
     import pyarrow as pa
 
     if pa.types.is_dictionary(array.type):
@@ -142,9 +147,13 @@ def _numbers(path: Path, row: int, name: str, array: Any) -> Array:
         values = np.array([np.nan if v is None else v for v in read])
     else:
         raise InputError(f"{path}, column {name[:60]}", f"a column of {kind}", "a column of numbers")
-    fail = np.flatnonzero(~(np.abs(values) <= LARGEST))
+    lost = np.zeros(len(values), dtype=bool)
+    if source is not None:
+        values, lost = without_missing(values, lost, source)
+    fail = np.flatnonzero(~(np.abs(values) <= LARGEST) & ~lost)
     if fail.size:
         place = f"{path}, row {row + int(fail[0])}, column {name[:60]}"
         shown = repr(array[int(fail[0])].as_py())[:60]
-        raise InputError(place, shown, f"a finite number of at most {LARGEST:g}")
+        text = f"a finite number of at most {LARGEST:g}{odd('NaN') if np.isnan(values[fail[0]]) else ''}"
+        raise InputError(place, shown, text)
     return values

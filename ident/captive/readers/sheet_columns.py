@@ -5,8 +5,9 @@ from __future__ import annotations
 import re
 from dataclasses import replace
 
+from ident.captive.headers import column
 from ident.captive.patterns import search
-from ident.captive.quantities import Column, column, owner, split
+from ident.captive.quantities import Column, owner, split
 from ident.captive.readers.sheet import Sheet, ignored
 from ident.captive.source import Source
 from sim.files.errors import InputError
@@ -58,8 +59,7 @@ def columns_of(sheet: Sheet, source: Source, text: tuple[str, ...]) -> list[Colu
         elif (declared is None and (source.patterns or ignored(header, source))) or (declared or header) in text:
             known.append(None)
         else:
-            factored = any(n in source.factor for n in (header, name))
-            known.append(_times(column(header, declared, sheet.where, factored), source, sheet.where))
+            known.append(_times(column(header, declared, sheet.where, source.factor), source, sheet.where))
     for key in source.columns:
         if key not in sheet.header and key not in [split(h)[0] for h in sheet.header]:
             shown = ", ".join(sheet.header)[:200]

@@ -38,6 +38,12 @@ def open_workbook(path: Path, source: Source) -> Sheet:
     except Exception as error:
         if not isinstance(error, (calamine.CalamineError, OSError, ValueError)):
             raise
+        if zipfile.is_zipfile(path):
+            inside = ", ".join(zipfile.ZipFile(path).namelist()[:3])
+            wrong = f"a zip archive of {inside[:100]}, and no workbook of that ending"
+            raise InputError(
+                str(path), wrong, "its files unpacked, or gzip; a workbook as xlsx, xlsb or ods"
+            ) from error
         raise InputError(str(path), f"not a workbook: {str(error)[:100]}", "a whole xlsx, xls, xlsb or ods") from error
     filled = [name for name, rows in sheets.items() if any(_filled(row) for row in rows)]
     name = chosen(path, filled, source, "worksheet")

@@ -91,11 +91,14 @@ def _unfinished(line: str, dialect: Dialect, wanted: list[int], open_end: bool, 
         return open_end
     if open_end and (len(cells) <= max(wanted) or dialect.number(cells[max(wanted)]) is None):
         return True
-    return dialect.delimiter != " " and any(i >= len(cells) or not cells[i] for i in wanted)
+    if dialect.delimiter == " ":
+        return False
+    return any(i >= len(cells) or (not cells[i] and "" not in dialect.nothing) for i in wanted)
 
 
 def _text_sheet(path: Path, source: Source, dialect: Dialect, header: list[str], first: Lines, skip: int) -> Sheet:
     """A sheet over the lines after the header; ``skip`` is the last row that is not data."""
+    dialect = replace(dialect, nothing=source.missing_words)
 
     def data() -> Iterator[Lines]:
         for block in _blocks(path, source):

@@ -72,6 +72,11 @@ _SPELLED = str.maketrans(
 )
 # A minus behind the number, as ledgers print it; (8.0) of accountants is read by ``bracketed``.
 _BEHIND = re.compile(r"(\d[\d.,' ]*(?:[eEdD][+-]?\d{1,3})?)-")
+# What loggers and spreadsheets write where they have no number; one too large to be a number of a load among it.
+_NOTHING = re.compile(
+    r"(?i)|#?n\.?/?a\.?|#?nan|null|none|nil|missing|[-\u2013\u2014.*?x]+|ol|ovl|over\w*|[-+]?inf(inity)?"
+    r"|#(div/0|value|wert|ref|bezug|num|zahl|nv|name)[!?]?|[-+]?1\.#\w+|[-+]?[\d.]+e\+?\d{2,3}"
+)
 # What a row without any cell is made of: spreadsheets write their empty rows so; DOS ends with ctrl-Z.
 _EMPTY = ' \t\r\f\v,;"\x1a'
 
@@ -198,11 +203,17 @@ class Dialect:
     delimiter : ``,``, ``;``, a tab, or a blank for any run of white space.
     decimal : ``.`` or ``,``.
     thousands : ``.``, ``,``, ``'`` or a blank between groups of three digits; empty for none.
+    nothing : Words that stand for a value that was not measured.
     """
 
     delimiter: str = ","
     decimal: str = "."
     thousands: str = ""
+    nothing: frozenset[str] = frozenset()
+
+    def absent(self, cell: str) -> bool:
+        """Whether a cell stands for a value that was not measured."""
+        return cell.strip() in self.nothing
 
     def cells(self, line: str, where: str) -> list[str]:
         """The cells of one line.
@@ -346,6 +357,7 @@ def numbers(
                 dtype=kind,
                 skipinitialspace=True,
                 keep_default_na=False,
+                na_values=sorted(dialect.nothing),
                 skip_blank_lines=False,
                 **_EXACT,
             )
@@ -353,13 +365,22 @@ def numbers(
             frame = None
         if frame is not None and frame.shape == (len(block.text), len(names)):
             values = frame[wanted].to_numpy(dtype=float)
-            if np.isfinite(values).all() and np.abs(values).max(initial=0.0) <= LARGEST:
+            # What is missing is no number; a clock has to be one.
+            sound = values[np.isfinite(values)] if dialect.nothing and not _no_clock(values, wanted, clock) else values
+            if np.isfinite(sound).all() and np.abs(sound).max(initial=0.0) <= LARGEST and not np.isinf(values).any():
                 return values
     return _one_by_one(path, block, dialect, wanted, names, hint, clock)
 
 
+def _no_clock(values: Array, wanted: list[int], clock: Clock) -> bool:
+    """Whether the column of the clock lacks a number."""
+    return clock is not None and bool(np.isnan(values[:, wanted.index(clock[0])]).any())
+
+
 def odd(cell: str) -> str:
-    """What to do with a cell that holds a number and something else; empty for other cells."""
+    """What to do with a cell that holds no number, or one and something else; empty for other cells."""
+    if _NOTHING.fullmatch(cell.strip()):
+        return f"; or missing = [{cell.strip()[:20]!r}] in [[source]]: not measured"
     if re.search(r"\d\s*(±|\+/?-|\+\u2212)\s*\d", cell):
         return "; an error behind the number is read in loads, KT, KQ, t and value of a table of runs alone"
     if re.search(r"\d\s*[*\u2020\u2021\u00a7#a-d]$", cell):
@@ -385,6 +406,8 @@ def _one_by_one(
             timed = clock is not None and clock[0] == column
             if value is None and timed and clock is not None:
                 value = clock[1].seconds(cells[column])
+            if value is None and not timed and dialect.absent(cells[column]):
+                value = np.nan
             if value is None:
                 place = f"{path}, row {row}, column {names[column][:60]}"
                 wrong = repr(cells[column][:60]) if cells[column] else "nothing"

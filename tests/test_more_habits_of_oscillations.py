@@ -1,0 +1,185 @@
+"""Oscillations as other laboratories write them: tables about a fixed point, amplitudes, phases, clocks, weights."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pandas as pd
+import pytest
+from made_campaigns import campaign, history
+
+from ident.captive.campaign import read_campaign
+from ident.checks.check import check_campaign
+from sim.files.errors import InputError
+
+FREQUENCY, AMPLITUDE = 0.25, 0.3
+OMEGA = 2.0 * math.pi * FREQUENCY
+X, DAMPING, INERTIA = -4.0e4, -3.0e5, -9.0e5
+N_DAMPING, N_INERTIA = -2.0e6, -1.0e5
+SPEED, ACCELERATION = AMPLITUDE * OMEGA, -AMPLITUDE * OMEGA**2
+CONSTANTS = """[source.constants]
+part = "hull"
+quality = "ok"
+U = "5 m/s"
+alpha = "0 deg"
+beta = "0 deg"
+D0 = "25 m"
+"""
+REDUCTION = '[source.reduction]\nkind = "oscillatory"\nmotion = "sway"\n'
+TABLE = {
+    "run_id": "s",
+    "frequency [Hz]": FREQUENCY,
+    "vdot [m/s^2]": ACCELERATION,
+    "X_mean [N]": X,
+    "Y_in [N]": INERTIA * ACCELERATION,
+    "Y_out [N]": DAMPING * SPEED,
+    "N_in [N m]": N_INERTIA * ACCELERATION,
+    "N_out [N m]": N_DAMPING * SPEED,
+}
+
+
+def of_table(folder, keys: str = "", constants: str = CONSTANTS, reduction: str = REDUCTION, **changed: float):
+    row = {k: v for k, v in (TABLE | changed).items() if v is not None}
+    source = f'[[source]]\nfiles = "table.csv"\n{keys}\n{constants}rel_sigma = 0.05\n{reduction}'
+    campaign(folder, source)
+    pd.DataFrame([row]).to_csv(folder / "table.csv", index=False)
+    runs = read_campaign(folder).runs
+    return runs.set_index(runs["run_id"].str[-2:])
+
+
+def record(phase: float = 0.0, start: float = 0.0) -> pd.DataFrame:
+    time = start + np.arange(0.0, 80.0, 0.05)
+    angle = OMEGA * time + phase
+    s, c = np.sin(angle), np.cos(angle)
+    noise = np.random.default_rng(2).standard_normal((3, time.size))
+    return pd.DataFrame(
+        {
+            "time_s": time,
+            "X_N": X + 10.0 * noise[0],
+            "Y_N": DAMPING * SPEED * c + INERTIA * ACCELERATION * s + 10.0 * noise[1],
+            "N_Nm": N_DAMPING * SPEED * c + N_INERTIA * ACCELERATION * s + 10.0 * noise[2],
+            "displacement_m": AMPLITUDE * s,
+        }
+    )
+
+
+def findings(folder, table: pd.DataFrame, keys: str = "", reduction: str = "", check: str = ""):
+    campaign(folder, history("run.csv", keys, CONSTANTS, REDUCTION + reduction))
+    table.to_csv(folder / "run.csv", index=False)
+    return [f for f in check_campaign(read_campaign(folder), folder) if f.check == check]
+
+
+# -- the point that moments are about -------------------------------------------------------------
+
+
+def test_a_table_about_a_fixed_point_is_moved_to_the_bodys(tmp_path):
+    """N about a point that stays has -y X in it: in phase, -A X_mean."""
+    own = of_table(tmp_path / "own")
+    fixed = TABLE["N_in [N m]"] - AMPLITUDE * X
+    left = of_table(tmp_path / "left", **{"N_in [N m]": fixed})
+    assert abs(left["N"]["+a"] - own["N"]["+a"]) == pytest.approx(-AMPLITUDE * X, rel=1e-9)
+    moved = of_table(tmp_path / "moved", 'moments_about = "fixed"', **{"N_in [N m]": fixed})
+    for load in "XYN":
+        np.testing.assert_allclose(moved[load], own[load], rtol=1e-9, atol=1e-6)
+
+
+def test_every_harmonic_of_the_force_is_taken_along(tmp_path):
+    """X of twice the frequency times y is a moment of the first and third harmonic."""
+    swing = 3.0e3
+    angle = np.linspace(0.0, 2.0 * np.pi, 360, endpoint=False)
+    moment = -AMPLITUDE * np.sin(angle) * swing * np.cos(2.0 * angle)
+    parts = {f"N_in{k or ''}": 2.0 * float((moment * np.sin((k or 1) * angle)).mean()) for k in (0, 2, 3)}
+    fixed = TABLE["N_in [N m]"] - AMPLITUDE * X + parts["N_in"]
+    changed = {"N_in [N m]": fixed, "N_in3 [N m]": parts["N_in3"], "X_out2 [N]": swing}
+    moved = of_table(tmp_path / "moved", 'moments_about = "fixed"', **changed)
+    own = of_table(tmp_path / "own", **{"X_out2 [N]": swing})
+    np.testing.assert_allclose(moved["N"], own["N"], rtol=1e-9)
+
+
+def test_a_table_about_a_fixed_point_needs_the_mean_of_its_force(tmp_path):
+    with pytest.raises(InputError, match="X_mean"):
+        of_table(tmp_path, 'moments_about = "fixed"', **{"X_mean [N]": None, "X_in [N]": 3.0})
+    with pytest.raises(InputError, match="no X"):
+        of_table(tmp_path, 'moments_about = "fixed"', **{"X_mean [N]": None})
+
+
+def test_a_point_that_may_stay_is_asked_for_by_what_it_does_to_the_added_mass(tmp_path):
+    """A X is a hundredth of N's swing and a tenth of the part in phase, which is its added inertia."""
+    asked = findings(tmp_path / "asked", record(), check="moment_point")
+    assert [f.severity for f in asked] == ["warning"]
+    assert not findings(tmp_path / "said", record(), 'moments_about = "body"\n', check="moment_point")
+
+
+# -- amplitude, phase, frequency ------------------------------------------------------------------------
+
+
+def test_the_displacement_of_a_table_is_its_amplitude(tmp_path):
+    known = of_table(tmp_path / "a")
+    other = of_table(tmp_path / "b", **{"vdot [m/s^2]": None, "displacement_m": AMPLITUDE})
+    np.testing.assert_allclose(other[["vdot", "beta", "Y"]], known[["vdot", "beta", "Y"]], rtol=1e-9, atol=1e-9)
+    both = of_table(tmp_path / "c", displacement_m=AMPLITUDE)
+    np.testing.assert_allclose(both["vdot"], known["vdot"])
+    with pytest.raises(InputError, match="amplitudes that agree"):
+        of_table(tmp_path / "d", displacement_m=2.0 * AMPLITUDE)
+
+
+def test_a_phase_that_nothing_says_is_named(tmp_path):
+    bare = record().drop(columns="displacement_m")
+    stated = f"frequency_hz = {FREQUENCY}\namplitude = {AMPLITUDE}\n"
+    found = findings(tmp_path / "bare", bare, reduction=stated, check="motion")
+    assert [f.severity for f in found] == ["warning"]
+    assert "phase_deg" in found[0].remedy
+    assert not findings(tmp_path / "said", bare, reduction=stated + "phase_deg = 0.0\n", check="motion")
+    assert not findings(tmp_path / "measured", record(), reduction=f"frequency_hz = {FREQUENCY}\n", check="motion")
+
+
+def test_the_frequency_of_a_record_may_be_a_channel_of_it(tmp_path):
+    bare = record().drop(columns="displacement_m").assign(**{"frequency [rad/s]": OMEGA})
+    stated = f"amplitude = {AMPLITUDE}\nphase_deg = 0.0\n"
+    findings(tmp_path, bare, reduction=stated)
+    runs = read_campaign(tmp_path).runs.set_index("run_id")
+    assert runs["vdot"]["run+a"] == pytest.approx(ACCELERATION, rel=1e-9)
+    with pytest.raises(InputError, match="frequency stated in the campaign too"):
+        findings(tmp_path, bare, reduction=stated + f"frequency_hz = {FREQUENCY}\n")
+    changing = bare.assign(**{"frequency [rad/s]": np.linspace(OMEGA, 1.2 * OMEGA, len(bare))})
+    with pytest.raises(InputError, match="one frequency all along"):
+        findings(tmp_path, changing, reduction=stated)
+
+
+def test_samples_at_any_time_show_no_lag_that_is_not_there(tmp_path):
+    """Of a steady sine nothing may be said, whatever the steps between its samples."""
+    time = np.sort(np.random.default_rng(3).uniform(0.0, 80.0, 1600))
+    table = record()
+    angle = OMEGA * time
+    table["time_s"], table["displacement_m"] = time, AMPLITUDE * np.sin(angle)
+    table["Y_N"] = DAMPING * SPEED * np.cos(angle) + INERTIA * ACCELERATION * np.sin(angle)
+    table["N_Nm"] = N_DAMPING * SPEED * np.cos(angle) + N_INERTIA * ACCELERATION * np.sin(angle)
+    assert not findings(tmp_path, table, check="delay")
+
+
+# -- weight in the loads ----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("left_in", "expected"), [(0.0, 0), (0.3, 1)])
+def test_the_added_mass_of_a_heaving_boat_is_no_weight(tmp_path, left_in, expected):
+    """A seventh of the displaced weight either way at the ends of heave, and nothing in common."""
+    weight = 4440e3 * 9.81
+    table = record().rename(columns={"Y_N": "Z_N", "N_Nm": "M_Nm"})
+    table["Z_N"] = table["Z_N"] * 0.15 * weight / np.abs(table["Z_N"]).max() - left_in * weight
+    reduction = f"frequency_hz = {FREQUENCY}\n".replace("sway", "heave")
+    campaign(tmp_path, history("run.csv", "", CONSTANTS, REDUCTION.replace("sway", "heave") + reduction))
+    table.to_csv(tmp_path / "run.csv", index=False)
+    found = [f for f in check_campaign(read_campaign(tmp_path), tmp_path) if f.check == "hydrostatic"]
+    assert len(found) == expected
+
+
+@pytest.mark.parametrize(("lever", "expected"), [(0.0, []), (0.02, ["M"])])
+def test_a_moment_without_incidence_is_a_part_of_the_weight_times_the_length(tmp_path, lever, expected):
+    weight, length = 4440e3 * 9.81, 70.2
+    source = f'[[source]]\nfiles = "runs.csv"\n{CONSTANTS}'.replace('alpha = "0 deg"\n', "")
+    campaign(tmp_path, source + 'test = "drift_vertical"\nrel_sigma = 0.03\n')
+    rows = [f"{a},{-2e6 * a},{2e7 * a + lever * weight * length}" for a in (-8, -4, 0, 4, 8)]
+    (tmp_path / "runs.csv").write_text("\n".join(["alpha_deg,Z_N,M_Nm", *rows]) + "\n", "utf-8")
+    found = [f for f in check_campaign(read_campaign(tmp_path), tmp_path) if f.check == "hydrostatic"]
+    assert [f.what[0] for f in found] == expected
