@@ -268,10 +268,17 @@ def main() -> None:
     counts: collections.Counter[tuple[str, str]] = collections.Counter()
     with tempfile.TemporaryDirectory() as folder, given.log.open("a", encoding="utf-8") as out:
         every = [s for s in subjects(Path(folder) / "campaigns", given.cases) if s.name.startswith(given.only)]
-        every = [s for s in every if begin(s)]
+        begun: dict[str, bool] = {}
         chosen = map(int, given.seeds.read_text("utf-8").split()) if given.seeds else None
         for seed in chosen or range(given.first, given.first + given.count):
-            subject = random.Random(f"campaign {seed}").choices(every, [s.weight for s in every])[0]
+            rng = random.Random(f"campaign {seed}")
+            # One that is refused as it is tells nothing.
+            while True:
+                subject = rng.choices(every, [s.weight for s in every])[0]
+                if subject.name not in begun:
+                    begun[subject.name] = begin(subject)
+                if begun[subject.name]:
+                    break
             line = one(subject, seed, Path(folder) / "db")
             counts[str(line["kind"]), str(line["what"])] += 1
             out.write(json.dumps(line) + "\n")
