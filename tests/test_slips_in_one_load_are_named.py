@@ -96,6 +96,16 @@ def put(column: str, row: int, text: str):
     return change
 
 
+def sorted_alone(column: str):
+    """Rows in no order, as of a sheet by run number, and one column in order all the same."""
+
+    def change(table: pd.DataFrame) -> None:
+        table[:] = table.sample(frac=1.0, random_state=3).to_numpy()
+        table[column] = sorted(table[column], key=float)
+
+    return change
+
+
 def shifted(column: str):
     """A column that begins a row later, without a value in its last row's place."""
 
@@ -118,6 +128,8 @@ SLIPS = {
     "thrust over rpm": ("remus100", "published.csv", value("X_nn", 100.0), "proportion", "error", "X_nn"),
     "a rudder in degrees": ("kvlcc2", SHIP, value("f_alpha", 0.25), "proportion", "warning", "f_alpha"),
     "a polynomial's sign": ("kvlcc2", SHIP, value("k_2", -1.0), "open_water", "error", "no end"),
+    "a column sorted alone": ("starter", "arm_r.csv", sorted_alone("X_N"), "rows", "warning", "sorted by itself"),
+    "pounds for a moment": ("suboff", "published.csv", value("N_v", 4.448), "proportion", "warning", "N_v"),
     "degrees for a rate": ("bb2", "estimates.csv", renamed("p_radps", "p_degps"), "proportion", "error", "K_up"),
     "a thrust deduction of the other sign": (
         "bb2", "self_propulsion.csv", times("t", -1.0, slice(3)), "coefficient", "error", "t (propeller)"),

@@ -4,8 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+import numpy as np
+
 from ident.captive.published import TEST as PUBLISHED
+from ident.captive.run_table import STATES
 from ident.checks.findings import Evidence, Finding, Rule, check, rows_of, together
+from sim.boat.catalogue import OUTPUTS
 
 
 @check("rows")
@@ -34,3 +38,33 @@ def a_run_of_another_part(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
             what = f"run {odd['run_id'].iloc[0]} is of part {counts.index[1]}, the {counts.iloc[0]} others of {test} "
             what += f"are of {counts.index[0]}"
             yield rule.finding(str(file), rows_of(odd), ["part"], what)
+
+
+@check("rows")
+def a_load_in_order_by_itself(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
+    """A load that only rises or falls from row to row of a file, where no state and no other load does."""
+    runs = evidence.runs
+    tested = runs[runs["test"] != PUBLISHED]
+    for file, group in tested.groupby("file", sort=False):
+        if len(group) < rule.limits["sorted"]:
+            continue
+        rows = group.sort_values("row")
+        ordered = {o: _in_order(rows[o].to_numpy(float), True) for o in OUTPUTS if rows[o].notna().all()}
+        loads = [o for o, one in ordered.items() if one]
+        if len(loads) != 1 or len(ordered) < 2 or any(_in_order(rows[s].to_numpy(float), False) for s in STATES):
+            continue
+        what = f"{loads[0]} goes in order from row to row of {len(rows)} runs, and no state or other load does: "
+        what += "was the column sorted by itself?"
+        yield rule.finding(str(file), rows_of(rows), loads, what)
+
+
+def _in_order(values: np.ndarray, strictly: bool) -> bool:
+    """Whether numbers rise throughout, or fall; those that are not all the same."""
+    if not np.isfinite(values).all() or float(np.ptp(values)) == 0.0:
+        return False
+    steps = np.diff(values)
+    return (
+        bool((steps > 0.0).all() or (steps < 0.0).all())
+        if strictly
+        else bool((steps >= 0.0).all() or (steps <= 0.0).all())
+    )
