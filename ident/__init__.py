@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from ident.analysis.result import Linear, Stability, StabilityMap
     from ident.analysis.stability import stability
     from ident.analysis.state_space import StateSpaceModel
+    from ident.calibration.crossed import CrossedSeries
     from ident.calibration.result import Calibrated, CalibrationSummary, LeftOut, MultiplierGroup, Prior, TrainedSeries
     from ident.calibration.version import calibrate
     from ident.captive.campaign import Campaign, read_campaign
@@ -112,6 +113,7 @@ _PLACES = {
     "CalibrationSummary": "ident.calibration.result",
     "MultiplierGroup": "ident.calibration.result",
     "Prior": "ident.calibration.result",
+    "CrossedSeries": "ident.calibration.crossed",
     "LeftOut": "ident.calibration.result",
     "TrainedSeries": "ident.calibration.result",
     "Series": "sim.flight.series",
@@ -179,6 +181,7 @@ __all__ = [  # noqa: RUF022  (in the order of the work)
     "CalibrationSummary",
     "MultiplierGroup",
     "Prior",
+    "CrossedSeries",
     "LeftOut",
     "TrainedSeries",
     "Series",

@@ -41,24 +41,26 @@ class Work:
 
 @dataclass(frozen=True)
 class Diagnostics:
-    """What ``calibrate`` also computes of its posterior (extra ``posterior``).
+    """What ``calibrate`` also computes of its posterior (draws and design by the extra ``posterior``).
 
     Attributes
     ----------
     posterior : Draws of it, which the quadratic at the optimum is held against; 0 for none.
     sensitivity : Size of a design, a power of two, by which it is said which prior decides each channel; 0 for none.
     seed : Of draws and design; 0 when None.
+    cross_validate : Whether each maneuver is predicted by a calibration on the others.
 
     Examples
     --------
     >>> import ident
     >>> ident.Diagnostics(posterior=4000, seed=3)
-    Diagnostics(posterior=4000, sensitivity=0, seed=3)
+    Diagnostics(posterior=4000, sensitivity=0, seed=3, cross_validate=False)
     """
 
     posterior: int = 0
     sensitivity: int = 0
     seed: int | None = None
+    cross_validate: bool = False
 
 
 @dataclass(frozen=True)

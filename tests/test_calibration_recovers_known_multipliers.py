@@ -11,6 +11,7 @@ import pandas as pd
 import pytest
 from click.testing import CliRunner
 
+from ident.calibration.crossed import cross_validated, mean_gains
 from ident.calibration.estimate import calibrate
 from ident.calibration.file import apply, load_calibration, parameters
 from ident.calibration.problem import contradictions, problem
@@ -215,7 +216,12 @@ def test_the_evidence_frees_what_the_maneuver_asks_for_and_holds_the_rest(folder
 
 
 @pytest.mark.parametrize(
-    ("options", "found"), [(["--sensitivity", "50"], "power of two"), (["--seed", "3"], "--seed goes with")]
+    ("options", "found"),
+    [
+        (["--sensitivity", "50"], "power of two"),
+        (["--seed", "3"], "--seed goes with"),
+        (["--cross-validate"], "trains on two maneuvers"),
+    ],
 )
 def test_options_of_draws_that_cannot_be_are_refused(folder, rows, tmp_path, options, found):
     from ident.database.store import commit
@@ -226,6 +232,23 @@ def test_options_of_draws_that_cannot_be_are_refused(folder, rows, tmp_path, opt
     assert done.exit_code == 2
     assert found in done.output
     assert len(versions(db)) == 1
+
+
+def test_a_maneuver_left_out_is_flown_by_the_multipliers_that_the_others_give(folder, campaign, rows, estimate):
+    """What two maneuvers of one truth teach is the same: left out is as good as trained, and far from uncalibrated."""
+    other = (folder / "made.toml").read_text("utf-8").replace('"made"', '"turned"')
+    (folder / "turned.toml").write_text(other, encoding="utf-8")
+    training = "".join(f'[[training]]\ncase = "{n}.toml"\nsource = "A"\n' for n in ("made", "turned"))
+    spec, where, _ = load_calibration(write_calibration(folder, training=training, name="crossed"))
+    two = problem(spec, where, campaign.vehicle, rows, parameters(spec, campaign.vehicle, rows, where))
+    found = cross_validated(two, calibrate(two, workers=1, start=estimate.theta), workers=1)
+    assert [(s.case, s.channel) for s in found] == [(case, c) for case in ("made", "turned") for c in CHANNELS]
+    for one in found:
+        assert one.left_out == pytest.approx(one.trained, rel=0.02)
+        # The rest is the noise of the record, of which speed has the most.
+        assert one.gain < (0.9 if one.channel == "u" else 0.3)
+    every = mean_gains(found)
+    assert every["", ""] == pytest.approx(np.sqrt(every["made", "A"] * every["turned", "A"]))
 
 
 def test_what_decides_each_channel_of_a_flight_is_said(task):

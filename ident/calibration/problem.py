@@ -146,6 +146,11 @@ class Problem:
                 every.append(channel.residual(one, self.cases[channel.key[0]][1]))
         return every
 
+    def rms(self, theta: Array) -> dict[Key, float]:
+        """Root mean square residual of every series at multipliers ``theta``, in the references' units."""
+        found = zip(self.channels, self.residuals(theta), strict=True)
+        return {c.key: float(np.sqrt(np.mean(r**2))) for c, r in found}
+
 
 def pieces(value: Array) -> int:
     """Independent pieces a record holds: crossings of its mean, plus one, at least two."""

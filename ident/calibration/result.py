@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     import pandas as pd
     from rich.console import Console
 
+    from ident.calibration.crossed import CrossedSeries
     from ident.calibration.posterior import Sampled
     from ident.calibration.sensitivity import Sensitivity
 
@@ -186,6 +187,7 @@ class CalibrationSummary:
     evidence : log evidence of the chosen groups and of all of them, less that of none.
     sampled : The posterior by draws, where that was asked for.
     sensitivity : What decides each channel over the priors, where that was asked for.
+    cross_validation : Every series predicted by the other maneuvers, where that was asked for.
 
     Examples
     --------
@@ -211,6 +213,7 @@ class CalibrationSummary:
     evidence: dict[str, float]
     sampled: Sampled | None = None
     sensitivity: list[Sensitivity] | None = None
+    cross_validation: list[CrossedSeries] | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """The summary for a program to read; without what was not asked for."""
@@ -299,6 +302,19 @@ def _show_draws(summary: CalibrationSummary, console: Console) -> None:
         console.print(table)
 
 
+def _show_crossed(crossed: list[CrossedSeries], console: Console) -> None:
+    """Print what each maneuver gains by the others."""
+    from rich.table import Table
+
+    from ident.calibration.crossed import mean_gains
+
+    title = "Each maneuver predicted by the others: RMSE on that without calibration, geometric means"
+    table = Table("case", "source", "left out", title=title)
+    for (case, source), gain in mean_gains(crossed).items():
+        table.add_row(on_screen(case or "all series"), on_screen(source), f"{gain:.2f}")
+    console.print(table)
+
+
 def show(done: Calibrated, console: Console) -> None:
     """Print priors and posteriors, the series, what was left out, and what to beware of."""
     from rich.markup import escape
@@ -328,6 +344,8 @@ def show(done: Calibrated, console: Console) -> None:
         names = [on_screen(name) for name in (s.case, s.source, s.channel)]
         table.add_row(*names, f"{s.rmse:.4g}", f"{s.sigma:.4g}")
     console.print(table)
+    if summary.cross_validation:
+        _show_crossed(summary.cross_validation, console)
     for one in summary.left_out:
         errors = ", ".join(f"{k} {v:.3g} ({one.rmse_trained[k]:.3g} trained)" for k, v in one.rmse_predicted.items())
         text = f"left out {one.case} {one.source}, predicted RMSE: {errors}"

@@ -12,6 +12,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from ident.calibration.cautions import UNLEARNT, cautions
+from ident.calibration.crossed import cross_validated, maneuvers
 from ident.calibration.estimate import Estimate
 from ident.calibration.estimate import calibrate as most_probable
 from ident.calibration.file import CalibrationFile, Parameter, apply, load_calibration, parameters
@@ -322,7 +323,9 @@ def _learnt(
         work.tell(text, 0, 0)
 
     seed, workers = diagnostics.seed or 0, work.workers
-    # Before the search, so that a size which cannot be is refused at once.
+    # Before the search, so that what cannot be is refused at once.
+    if diagnostics.cross_validate:
+        maneuvers(every)
     size = diagnostics.sensitivity
     shares = what_decides(every, size, seed, workers, each) if size else None
     solved = _solved(every, spec.choose, workers, each)
@@ -330,6 +333,7 @@ def _learnt(
     without = _left_out(task, estimate, workers, each) if left_out else []
     draws = diagnostics.posterior
     drawn = sample(task, estimate, draws, seed, workers, each) if draws else None
+    crossed = cross_validated(task, estimate, workers, each) if diagnostics.cross_validate else None
     series = [
         TrainedSeries(*key, float(f"{rmse:.4g}"), float(f"{estimate.sigma[key]:.4g}"))
         for key, rmse in estimate.rms.items()
@@ -352,6 +356,7 @@ def _learnt(
         evidence={which: float(f"{value:.4g}") for which, value in evidence.items()},
         sampled=drawn,
         sensitivity=shares,
+        cross_validation=crossed,
     )
 
 

@@ -102,6 +102,7 @@ class CalibrateOptions:
     posterior: int | None
     sensitivity: int | None
     seed: int | None
+    cross_validate: bool
     json_path: str | None
     wait: float
 
@@ -328,6 +329,7 @@ def _all(asked: ValidateOptions, console: Any) -> Scoreboard:
     help="Also say which prior decides each channel; N a power of two (SALib).",
 )
 @click.option("--seed", type=click.IntRange(0, 2**32 - 1), default=None, help="Of --posterior and --sensitivity; 0.")
+@click.option("--cross-validate", is_flag=True, help="Also predict each maneuver by a calibration on the others.")
 @json_to("Write priors, posteriors and diagnostics.")
 @WAIT
 def calibrate(**options: Any) -> None:
@@ -341,6 +343,7 @@ def calibrate(**options: Any) -> None:
              ident calibrate my_boat.toml --no-left-out --json -
              ident calibrate bb2 --no-left-out --posterior 4000
              ident calibrate bb2 --no-left-out --sensitivity 64
+             ident calibrate bb2 --no-left-out --cross-validate
     """
     import ident
     from ident.calibration.result import show
@@ -350,7 +353,7 @@ def calibrate(**options: Any) -> None:
     console = console_for(quiet=asked.json_path == "-")
     with console.status("calibrating") as status:
         work = ident.Work(asked.wait, lambda what, done, of: status.update(on_screen(what)))
-        diagnostics = ident.Diagnostics(asked.posterior or 0, asked.sensitivity or 0, asked.seed)
+        diagnostics = ident.Diagnostics(asked.posterior or 0, asked.sensitivity or 0, asked.seed, asked.cross_validate)
         done = ident.calibrate(
             asked.name,
             asked.db,
