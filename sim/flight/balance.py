@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sim.boat.state import PHI, THETA, Z
-from sim.compiled import inner, merged, outer
+from sim.compiled import merged, outer
 from sim.kernel.layout import DIAMETER, HAS_TANKS, HELD, N_PLANES, SHIFT, Array, Whole
 from sim.kernel.rhs import fill_rate
 
@@ -59,8 +59,8 @@ class Search(NamedTuple):
     a: Array
 
 
-@outer
-def place(b: Search, x: np.ndarray) -> None:
+@merged
+def _place(b: Search, x: np.ndarray) -> None:
     """State, controls and shift of the weight that the unknowns mean, into the search and its scratch."""
     level, y, c = b.level, b.y, b.c
     for i in range(2):
@@ -84,8 +84,8 @@ def place(b: Search, x: np.ndarray) -> None:
         c[planes + 1], c[planes + 2] = level[BALLAST], level[TRIM_TANK]
 
 
-@outer
-def hold(b: Search, x: np.ndarray) -> None:
+@merged
+def _hold(b: Search, x: np.ndarray) -> None:
     """Residuals of held heave, roll and pitch: pitch, heel and dV, which are zero there."""
     if b.w[HELD] & 4:
         b.dy[2] = x[1]
@@ -118,13 +118,13 @@ def _solve(a: np.ndarray) -> bool:
     return True
 
 
-@inner
-def _try(b: Search, x: np.ndarray) -> float:
-    """Accelerations at the unknowns, and what stands for those that are held; the sum of their squares."""
-    place(b, x)
+@outer
+def attempt(b: Search, x: np.ndarray) -> float:
+    """Accelerations at the unknowns, and what stands for those held, into ``b.dy``; the sum of their squares."""
+    _place(b, x)
     fill_rate(b.m, b.w, b.y, b.c, (), b.s, b.k, b.dy)
     if b.w[HELD]:
-        hold(b, x)
+        _hold(b, x)
     total = 0.0
     for i in range(N_X):
         total += b.dy[i] * b.dy[i]
@@ -140,7 +140,7 @@ def _slopes(b: Search, x: np.ndarray) -> None:
         h = _DIFFERENCE * max(abs(kept), 1e-2)
         x[j] = kept + h
         h = x[j] - kept
-        _try(b, x)
+        attempt(b, x)
         x[j] = kept
         for i in range(N_X):
             a[_SYSTEM + (N_X + 1) * i + j] = (b.dy[i] - a[_RESIDUAL + i]) / h
@@ -156,7 +156,7 @@ def _step_down(b: Search, x: np.ndarray, norm: float) -> bool:
     for _ in range(_HALVINGS):
         for i in range(N_X):
             x[i] = a[_X + i] + share * a[_SYSTEM + (N_X + 1) * i + N_X]
-        if _try(b, x) < norm:
+        if attempt(b, x) < norm:
             return True
         share *= 0.5
     return False
@@ -173,7 +173,7 @@ def balance(b: Search, x: np.ndarray) -> float:
     a, largest = b.a, np.inf
     # The last step counts when it gains.
     for _ in range(_ITERATIONS):
-        norm, largest = _try(b, x), 0.0
+        norm, largest = attempt(b, x), 0.0
         for i in range(N_X):
             a[_RESIDUAL + i] = b.dy[i]
             largest = max(largest, abs(b.dy[i]))
@@ -183,6 +183,6 @@ def balance(b: Search, x: np.ndarray) -> float:
         if not (_solve(a) and _step_down(b, x, norm)):
             for i in range(N_X):
                 x[i] = a[_X + i]
-            _try(b, x)
+            attempt(b, x)
             return largest
     return largest

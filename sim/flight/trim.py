@@ -8,9 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.boat.state import PSI, THETA, X, Y
-from sim.flight.balance import DV, SCRATCH, Search, balance, hold, place
+from sim.flight.balance import DV, SCRATCH, Search, attempt, balance
 from sim.kernel.layout import Model, workspace
-from sim.kernel.rhs import fill_rate
 
 Array = NDArray[np.float64]
 
@@ -107,9 +106,7 @@ def _solve(search: Search, model: Model) -> tuple[Trim, str]:
     state, derivative, controls = search.y, search.dy, search.c
 
     def residual(x: Array) -> Array:
-        place(search, x)
-        fill_rate(search.m, search.w, state, controls, (), search.s, search.k, derivative)
-        hold(search, x)
+        attempt(search, x)
         return derivative[:6].copy()
 
     # n relative to U/D: an advance coefficient near one.
