@@ -31,7 +31,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.boat.state import PHI, PSI, THETA, X, Y, Z
-from sim.compiled import inlined, inner, outer
+from sim.compiled import inner, merged, outer
 from sim.waves.linear import Waves
 from sim.waves.pressure import Quadrature, box_top, fill_rotation
 from sim.waves.sums import LANES, fill_many, sum_few, sum_many
@@ -228,7 +228,7 @@ def passage(sea: Sea) -> Passage:
     )
 
 
-@inlined
+@merged
 def _place(sea: Sea, y: Array, last: int, pas: Passage) -> float:
     """Points up to ``last`` and their velocities in earth axes from the shallowest one, whose depth is given [m]."""
     points, place, motion, m = sea.points, pas.place, pas.motion, pas.matrix
@@ -253,7 +253,7 @@ def _place(sea: Sea, y: Array, last: int, pas: Passage) -> float:
     return top
 
 
-@inlined
+@merged
 def _fill_few(w: Waves, north: float, east: float, time: float, top: float, pas: Passage) -> None:
     """Sizes and phases of the components at a place, time and depth."""
     for j in range(w.amplitude.size):
@@ -267,7 +267,7 @@ def _fill_few(w: Waves, north: float, east: float, time: float, top: float, pas:
         pas.size[2, j], pas.phase[2, j] = w.amplitude[j], angle - HALF_PI
 
 
-@inlined
+@merged
 def _sum(sea: Sea, y: Array, time: float, last: int, pas: Passage) -> None:
     """Sums at the points up to ``last``, in earth axes."""
     w, top = sea.waves, _place(sea, y, last, pas)
@@ -288,7 +288,7 @@ def _sum(sea: Sea, y: Array, time: float, last: int, pas: Passage) -> None:
         start = end
 
 
-@inner
+@merged
 def _turn(sums: Array, last: int, m: Array, y: Array) -> None:
     """Earth vectors and their rates to body axes, where they are; the rate is that of the body-axis components."""
     m00, m01, m02, m10, m11, m12 = m[0, 0], m[0, 1], m[0, 2], m[1, 0], m[1, 1], m[1, 2]
@@ -328,29 +328,16 @@ def _add_up(sea: Sea, first: int, last: int, sums: Array, value: Array, slope: A
     slope[at], slope[at + 1], slope[at + 2], slope[at + 3], slope[at + 4], slope[at + 5] = d0, d1, d2, d3, d4, d5
 
 
-@inlined
+@merged
 def _near(sea: Sea, y: Array, matrix: Array) -> bool:
     """Whether a crest can reach the boat before the next sums; ``matrix`` turns body to earth."""
     rise = sea.span * sqrt(y[0] * y[0] + y[1] * y[1] + y[2] * y[2])
     return y[Z] + box_top(sea.box.reshape(6), 0, matrix[2, 0], matrix[2, 1], matrix[2, 2]) - rise <= sea.crest
 
 
-@outer
-def evaluate(sea: Sea, y: Array, time: float, pas: Passage, value: Array, slope: Array) -> None:
-    """Every wave quantity at a state, exactly, with its rate along the present motion.
-
-    Parameters
-    ----------
-    sea : With at least one component.
-    y : (12,) state.
-    time : [s].
-    pas : Scratch arrays.
-    value, slope : (n,) results, body axes about the body origin: FORCE Froude-Krylov load
-        [N, N m], IMPULSE [kg m/s, kg m^2/s], WATER u v w p q r [m/s, rad/s], PROBES three
-        velocities each [m/s], head of the wave's pressure at the gauge [m], elevation over each
-        station [m, up], zero where no crest comes near the boat; and their rates. The rate of
-        IMPULSE is the added-mass load.
-    """
+@inner
+def sum_up(sea: Sea, y: Array, time: float, pas: Passage, value: Array, slope: Array) -> None:
+    """``evaluate`` for compiled functions."""
     n, felt, gauge = sea.volumes, sea.weights.shape[0], sea.points.shape[0] - sea.stations - 1
     fill_rotation(y[PHI], y[THETA], y[PSI], pas.matrix)
     last = sea.points.shape[0] if _near(sea, y, pas.matrix) else gauge + 1
@@ -371,3 +358,22 @@ def evaluate(sea: Sea, y: Array, time: float, pas: Passage, value: Array, slope:
         for j in range(6):
             value[WATER + i] += sea.compliance[i, j] * value[IMPULSE + j]
             slope[WATER + i] += sea.compliance[i, j] * slope[IMPULSE + j]
+
+
+@outer
+def evaluate(sea: Sea, y: Array, time: float, pas: Passage, value: Array, slope: Array) -> None:
+    """Every wave quantity at a state, exactly, with its rate along the present motion.
+
+    Parameters
+    ----------
+    sea : With at least one component.
+    y : (12,) state.
+    time : [s].
+    pas : Scratch arrays.
+    value, slope : (n,) results, body axes about the body origin: FORCE Froude-Krylov load
+        [N, N m], IMPULSE [kg m/s, kg m^2/s], WATER u v w p q r [m/s, rad/s], PROBES three
+        velocities each [m/s], head of the wave's pressure at the gauge [m], elevation over each
+        station [m, up], zero where no crest comes near the boat; and their rates. The rate of
+        IMPULSE is the added-mass load.
+    """
+    sum_up(sea, y, time, pas, value, slope)

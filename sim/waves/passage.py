@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.boat.state import PHI, PSI, THETA
-from sim.compiled import inlined, inner, outer
-from sim.waves.loads import IMPULSE, WATER, Passage, Sea, evaluate
+from sim.compiled import inlined, inner, merged, outer
+from sim.waves.loads import IMPULSE, WATER, Passage, Sea, sum_up
 from sim.waves.pressure import fill_rotation
 
 Array = NDArray[np.float64]
@@ -56,6 +56,30 @@ def _miss(sea: Sea, y: Array, pas: Passage) -> float:
     return miss
 
 
+@merged
+def move_on(sea: Sea, y: Array, time: float, pas: Passage) -> bool:
+    """``advance`` as a part of its caller: handing over a sea and its sums takes long."""
+    ahead = pas.time[1]
+    if pas.time[0] <= time < ahead - 1e-9 * sea.span:
+        return False
+    known = pas.time[0] <= ahead and abs(time - ahead) <= 1e-6 * sea.span
+    anew = not (known and _miss(sea, y, pas) <= sea.reach)
+    if anew:
+        sum_up(sea, y, time, pas, pas.value[0], pas.slope[0])
+    else:
+        for i in range(pas.value.shape[1]):
+            pas.value[0, i], pas.slope[0, i] = pas.value[1, i], pas.slope[1, i]
+    gain, mean = pas.gain, pas.sums[0]
+    for k in range(6):
+        gain[k] = y[k] - pas.before[k] if known else 0.0
+        pas.before[k] = y[k]
+    pas.time[0] = time
+    pas.time[1] = time + sea.span
+    _predict(sea, y, gain, mean, pas.matrix, pas.state)
+    sum_up(sea, pas.state, pas.time[1], pas, pas.value[1], pas.slope[1])
+    return anew
+
+
 @outer
 def advance(sea: Sea, y: Array, time: float, pas: Passage) -> bool:
     """Make the sums cover the time from now on; call it before a step, not within one.
@@ -70,25 +94,7 @@ def advance(sea: Sea, y: Array, time: float, pas: Passage) -> bool:
     -------
     Whether the sums at the start are new, and not those that ended the span before.
     """
-    ahead = pas.time[1]
-    if pas.time[0] <= time < ahead - 1e-9 * sea.span:
-        return False
-    known = pas.time[0] <= ahead and abs(time - ahead) <= 1e-6 * sea.span
-    anew = not (known and _miss(sea, y, pas) <= sea.reach)
-    if anew:
-        evaluate(sea, y, time, pas, pas.value[0], pas.slope[0])
-    else:
-        for i in range(pas.value.shape[1]):
-            pas.value[0, i], pas.slope[0, i] = pas.value[1, i], pas.slope[1, i]
-    gain, mean = pas.gain, pas.sums[0]
-    for k in range(6):
-        gain[k] = y[k] - pas.before[k] if known else 0.0
-        pas.before[k] = y[k]
-    pas.time[0] = time
-    pas.time[1] = time + sea.span
-    _predict(sea, y, gain, mean, pas.matrix, pas.state)
-    evaluate(sea, pas.state, pas.time[1], pas, pas.value[1], pas.slope[1])
-    return anew
+    return move_on(sea, y, time, pas)
 
 
 @inner

@@ -21,12 +21,11 @@ from numba.extending import overload
 from numpy.typing import NDArray
 
 from sim.boat.state import Z
-from sim.compiled import CHOSEN, CHOSEN_INLINED, inlined, inner, outer
+from sim.compiled import CHOSEN, CHOSEN_INLINED, inlined, inner
 from sim.hull.emergence import Cells, flat_cells, lose
-from sim.waves import passage as wave_passage
 from sim.waves.drift import Drift, mean_load
 from sim.waves.loads import FORCE, IMPULSE, PROBES, WATER, Passage, Sea, passage
-from sim.waves.passage import CURVE, fit, height, recall, rise
+from sim.waves.passage import CURVE, fit, height, move_on, recall, rise
 from sim.waves.pressure import box_top
 
 Array = NDArray[np.float64]
@@ -197,12 +196,12 @@ def _fit(a: Array, sums: Passage) -> None:
                 a[load + k] += mass * k * a[water + k + 1]
 
 
-@outer
+@inner
 def _cover(a: Array, b: Whole, sea: Sea, y: Array, time: float, sums: Passage) -> None:
     """Sums and curves of the span that begins now."""
     if a[SPAN_END] > a[SPAN_START]:
         recall(a, CURVES, a[SPAN_END] - a[SPAN_START], sums.value, sums.slope)
-    anew = wave_passage.advance(sea, y, time, sums)
+    anew = move_on(sea, y, time, sums)
     if b[DRIFT]:
         _add_mean(a, b, y, anew, sums)
     _fit(a, sums)
