@@ -53,7 +53,7 @@ class Sea(NamedTuple):
     """Waves and the boat's points in them; shared by threads.
 
     waves : Components; a sea without components is calm and must not be evaluated.
-    single : (6, n or a little more) k, k cos chi, k sin chi, omega, cos chi, sin chi in single precision.
+    single : (6, n or a little more) as ``sim.waves.sums.sum_many`` takes it.
     points : (v + s + p + 1 + e, 3) volume points, section centres, probes, the depth gauge,
         stations over which the elevation is wanted, in the body frame [m].
     volumes : v. weights : (v + s, 3) in x, y, z: rho V of the volume points, c m of the sections [kg].
@@ -186,7 +186,7 @@ def make_sea(
     gauge = np.zeros((1, 3))
     k, w, a = waves.number, waves.frequency, waves.amplitude
     single = np.zeros((6, k.size + -k.size % LANES))
-    single[:, : k.size] = k, k * waves.north, k * waves.east, w, waves.north, waves.east
+    single[:, : k.size] = k, k / TWO_PI * waves.north, k / TWO_PI * waves.east, w, waves.north, waves.east
     points = np.concatenate([volume.points, centres, probes, gauge, over])
     return Sea(
         waves,

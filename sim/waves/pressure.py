@@ -28,7 +28,7 @@ from sim.waves.linear import Waves, kinematics
 Array = NDArray[np.float64]
 
 # Share of the whole load that may be lost where a part or a section is taken as fewer points.
-_NEGLIGIBLE = 1e-4
+_NEGLIGIBLE = 3e-4
 _SLICES = 160
 # Relative difference of second moments below which a section is round.
 _ROUND = 1e-9

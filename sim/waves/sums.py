@@ -23,19 +23,18 @@ _FAST = {"reassoc", "contract", "nsz", "arcp"}
 # Components are filled up to a multiple of this with some of no height: what fills no register takes as long.
 LANES = 16
 
-_HALF, _ONE = np.float32(0.5), np.float32(1.0)
-_PER_PI, _PI = np.float32(1.0 / np.pi), np.float32(np.pi)
-_TWO_PI, _HALF_PI = 2.0 * np.pi, 0.5 * np.pi
+_HALF, _ONE, _QUARTER, _TURN = np.float32(0.5), np.float32(1.0), np.float32(0.25), np.float32(2.0 * np.pi)
+_TWO_PI = 2.0 * np.pi
 
 
 def _even(function: Callable[[Array], Array], degree: int) -> tuple[float, ...]:
-    """Coefficients in x^2 of an even function within a quarter turn, through Chebyshev's points."""
-    line = Chebyshev.interpolate(lambda q: function(np.sqrt(q)), degree, (0.0, _HALF_PI**2))
+    """Coefficients in x^2 of an even function of half an angle of x turns, to half a turn, by Chebyshev's points."""
+    line = Chebyshev.interpolate(lambda q: function(np.pi * np.sqrt(q)), degree, (0.0, 0.25))
     return tuple(float(c) for c in line.convert(kind=Polynomial, domain=(-1, 1), window=(-1, 1)).coef)
 
 
 def _cardinal(x: Array) -> Array:
-    return np.sinc(x / np.pi)
+    return np.asarray(np.pi * np.sinc(x / np.pi))
 
 
 # In single precision, to 5e-8, and in double, to 2e-15.
@@ -60,7 +59,7 @@ def _series(c: tuple[float, ...], x: float) -> float:
 def fill_many(
     w: Waves, north: float, east: float, time: float, top: float, angle: Array, sizes: Single, phases: Single
 ) -> None:
-    """Sizes of ``sum_many`` at a depth, and halves of the phases at a place and time.
+    """Sizes of ``sum_many`` at a depth, and phases in turns at a place and time.
 
     Parameters
     ----------
@@ -70,10 +69,10 @@ def fill_many(
     for j in range(w.number.size):
         angle[j] = w.number[j] * (w.north[j] * north + w.east[j] * east) - w.frequency[j] * time + w.phase[j]
     for j in range(w.number.size):
-        turned = angle[j] - _TWO_PI * np.floor(angle[j] / _TWO_PI)
-        phases[1, j] = 0.5 * turned
+        turns = angle[j] / _TWO_PI
+        phases[1, j] = turns - np.floor(turns)
     for j in range(w.number.size):
-        phases[0, j] = phases[2, j] = phases[1, j] - np.float32(0.5 * _HALF_PI)
+        phases[0, j] = phases[2, j] = phases[1, j] - _QUARTER
     z = np.float32(top) * _SIXTEENTH
     for j in range(w.number.size):
         t = max(-np.float32(w.number[j]) * z, _NOTHING)
@@ -102,21 +101,23 @@ def sum_many(
 ) -> None:
     """As ``sum_few``, in single precision, sixteen components at a time where the machine can.
 
+    Sine and cosine are those of twice half the angle, for which a turn more or less makes no difference.
+
     Parameters
     ----------
-    phases : Halves of them: sine and cosine are those of twice the angle, for which half a turn makes no difference.
+    single : (6, n) k [1/m], k cos chi and k sin chi in turns [1/m], omega, cos chi, sin chi.
+    phases : In turns.
     """
     k, kn, ke = single[0], single[1], single[2]
     w, north, east = single[3], single[4], single[5]
     size, phase = sizes[kind], phases[kind]
     for i in range(first, last):
-        x, y = _HALF * np.float32(place[i, 0]), _HALF * np.float32(place[i, 1])
-        z = _SIXTEENTH * np.float32(place[i, 2])
-        vx, vy, vz = np.float32(motion[i, 0]), np.float32(motion[i, 1]), np.float32(motion[i, 2])
+        x, y, z = np.float32(place[i, 0]), np.float32(place[i, 1]), _SIXTEENTH * np.float32(place[i, 2])
+        vx, vy, vz = _TURN * np.float32(motion[i, 0]), _TURN * np.float32(motion[i, 1]), np.float32(motion[i, 2])
         a0 = a1 = a2 = b0 = b1 = b2 = np.float32(0.0)
         for j in range(size.size):
-            half = kn[j] * x + ke[j] * y + phase[j]
-            r = half - np.floor(half * _PER_PI + _HALF) * _PI
+            turns = kn[j] * x + ke[j] * y + phase[j]
+            r = turns - np.floor(turns + _HALF)
             q = r * r
             s = r * (_S0 + q * (_S1 + q * (_S2 + q * (_S3 + q * _S4))))
             c = _C0 + q * (_C1 + q * (_C2 + q * (_C3 + q * _C4)))
@@ -166,10 +167,10 @@ def sum_few(
             sums[i, j] = 0.0
     for j in range(size.size):
         k, north, east, frequency = w.number[j], w.north[j], w.east[j], w.frequency[j]
-        kn, ke, kz, half, high = 0.5 * k * north, 0.5 * k * east, _SIXTY_FOURTH * k, 0.5 * phase[j], size[j]
+        kn, ke, kz, start, high = k * north, k * east, _SIXTY_FOURTH * k, phase[j], size[j]
         for i in range(first, last):
-            angle = kn * place[i, 0] + ke * place[i, 1] + half
-            turned[i] = angle - np.pi * np.floor(angle / np.pi + 0.5)
+            turns = (kn * place[i, 0] + ke * place[i, 1] + start) / _TWO_PI
+            turned[i] = turns - np.floor(turns + 0.5)
         for i in range(first, last):
             e = _series(_TAYLOR, max(-kz * place[i, 2], _NONE))
             e *= e
@@ -185,7 +186,7 @@ def sum_few(
         for i in range(first, last):
             twice = 2.0 * decayed[i] * sine[i]
             c, s = decayed[i] - twice * sine[i], twice * cosine[i]
-            rate = frequency - 2.0 * (kn * motion[i, 0] + ke * motion[i, 1])
+            rate = frequency - kn * motion[i, 0] - ke * motion[i, 1]
             decay = k * motion[i, 2]
             dc, ds = rate * s - decay * c, -rate * c - decay * s
             sums[i, 0] += north * c
