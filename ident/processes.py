@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import gc
 import logging
 import multiprocessing
 import os
@@ -62,6 +63,8 @@ def unheard() -> Iterator[None]:
 def _serve(results: Connection, work: Callable[[], object]) -> None:
     """Do it, and send the files it read, what it warned of, and what it gave or raised."""
     serves()
+    # Looking through what the other process holds would copy it.
+    gc.freeze()
     with warnings.catch_warnings(record=True) as warned:
         try:
             given = work()

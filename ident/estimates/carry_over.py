@@ -16,7 +16,9 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
+from typing import TypeAlias
 
 import numpy as np
 import pandas as pd
@@ -29,6 +31,7 @@ from sim.hull.lattice import FINE, Fin, in_cylinder, in_wall, influence, lattice
 from sim.hull.surface import Geometry, Hull, hull_of
 
 Array = NDArray[np.float64]
+ByPlane: TypeAlias = dict[str, dict[str, float]]
 
 # A coarser lattice, for the discretisation error.
 _COARSE = (4, 7, 4)
@@ -198,17 +201,16 @@ def _parts(vehicle: Vehicle) -> tuple[pd.DataFrame, pd.DataFrame, Hull, pd.DataF
     return stern, forward, hull_of(folder / parts["hull"].offsets), pd.read_csv(folder / parts["sail"].offsets)
 
 
-def _by_plane(foils: pd.DataFrame, fixed: bool) -> dict[str, dict[str, float]]:
-    """Plane -> numbers of its moving foil, or of its fixed root."""
-    rows = foils[foils["fixed"] == int(fixed)].set_index("plane").drop(columns=["name", "fixed"])
+def _by_plane(foils: pd.DataFrame) -> ByPlane:
+    """Plane -> numbers of its foil."""
+    rows = foils.set_index("plane").drop(columns=["name", "fixed"])
     return {str(plane): {str(c): float(x) for c, x in row.items()} for plane, row in rows.iterrows()}
 
 
-def _stern_fins(foils: pd.DataFrame, gap: float, radius: float) -> list[Fin]:
+def _stern_fins(roots: ByPlane, moving: ByPlane, gap: float, radius: float) -> list[Fin]:
     """The stern fins with the gap between its leading- (0) and trailing-edge (1) place."""
-    roots = _by_plane(foils, fixed=True)
     fins = []
-    for name, plane in _by_plane(foils, fixed=False).items():
+    for name, plane in moving.items():
         root = roots[name]
         cut = plane["LE_root_s_m"] + gap * (plane["TE_root_s_m"] - plane["LE_root_s_m"])
         tip = 0.5 * (plane["LE_tip_s_m"] + plane["TE_tip_s_m"])
@@ -257,11 +259,12 @@ def carry_over(vehicle: Vehicle) -> CarryOver:
     edges = np.array([roots["LE_root_x_m"].mean(), roots["TE_root_x_m"].mean()])
     radii = [float(np.ravel(hull.radius(edges[i : i + 1], np.array([np.pi / 4.0])))[0]) for i in (0, 1)]
     middle = float(np.mean(radii))
-    factors = [stern_factors(_stern_fins(foils, g, a), a) for g, a in ((0.5, r) for r in radii)]
-    factors += [stern_factors(_stern_fins(foils, g, middle), middle) for g in (0.0, 1.0)]
-    first = _stern_fins(foils, 0.5, middle)[0]
-    best = stern_factors(_stern_fins(foils, 0.5, middle), middle)
-    coarse = stern_factors(_stern_fins(foils, 0.5, middle), middle, _COARSE)
+    fins = partial(_stern_fins, _by_plane(roots), _by_plane(moving))
+    factors = [
+        stern_factors(fins(g, a), a) for g, a in ((0.5, radii[0]), (0.5, radii[1]), (0.0, middle), (1.0, middle))
+    ]
+    first = fins(0.5, middle)[0]
+    best, coarse = (stern_factors(fins(0.5, middle), middle, counts) for counts in (FINE, _COARSE))
 
     def sigma(key: str) -> float:
         # Each pair spans what is possible: a quarter of it is one standard deviation.

@@ -78,9 +78,9 @@ def correlation_texts(covariance: Array, names: Iterable[int] | None = None) -> 
     row, column = np.nonzero(np.abs(matrix) > _LEAST_CORRELATION)
     # A version has some hundred thousand pairs, half of them equal to another: each number is written once.
     different, which = np.unique(matrix[row, column], return_inverse=True)
-    written = [f"{x:.6g}" for x in different.tolist()]
-    before = [f"{n}:" for n in number]
-    pairs = [before[j] + written[k] for j, k in zip(column.tolist(), which.tolist(), strict=True)]
+    written = np.array([f"{x:.6g}" for x in different.tolist()], dtype=object)
+    before = np.array([f"{n}:" for n in number], dtype=object)
+    pairs = (before[column] + written[which]).tolist()
     ends = np.searchsorted(row, np.arange(len(number) + 1)).tolist()
     return {number[i]: " ".join(pairs[low:high]) for i, (low, high) in enumerate(pairwise(ends)) if low < high}
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -93,14 +93,24 @@ def lattice(fins: list[Fin], counts: tuple[int, int, int] = FINE) -> Lattice:
     )
 
 
-def _segment(p: Array, a: Array, b: Array) -> Array:
-    """Velocity at points p (n, 1, 3) of unit straight vortices from a to b (m, 3), Biot and Savart."""
+# From vortex ends to points, by components, each (n, m): the way, and its direction.
+_Seen: TypeAlias = tuple[list[Array], list[Array]]
+
+
+def _seen(p: Array, end: Array) -> _Seen:
+    """Way and direction from the ends of vortices (m, 3) to points p (n, 1, 3)."""
     # By components: products of short vectors cost more than the numbers in them.
-    r1, r2 = ([p[..., i] - end[:, i] for i in range(3)] for end in (a, b))
-    n1, n2 = (np.sqrt(r[0] ** 2 + r[1] ** 2 + r[2] ** 2) for r in (r1, r2))
+    way = [p[..., i] - end[:, i] for i in range(3)]
+    length = np.sqrt(way[0] ** 2 + way[1] ** 2 + way[2] ** 2)
+    return way, [one / length for one in way]
+
+
+def _segment(a: Array, b: Array, from_a: _Seen, from_b: _Seen) -> Array:
+    """Velocity at points of unit straight vortices from a to b (m, 3), Biot and Savart."""
+    (r1, d1), (r2, d2) = from_a, from_b
     cross = [r1[i] * r2[j] - r1[j] * r2[i] for i, j in ((1, 2), (2, 0), (0, 1))]
     square = cross[0] ** 2 + cross[1] ** 2 + cross[2] ** 2
-    side = [(b[:, i] - a[:, i]) * (r1[i] / n1 - r2[i] / n2) for i in range(3)]
+    side = [(b[:, i] - a[:, i]) * (d1[i] - d2[i]) for i in range(3)]
     # On the vortex's own line the velocity is zero.
     along = np.divide(
         side[0] + side[1] + side[2], 4.0 * np.pi * square, out=np.zeros_like(square), where=square > 1e-12
@@ -115,8 +125,10 @@ def horseshoes(p: Array, a: Array, b: Array) -> Array:
     -------
     (n, m, 3) [1/m]; the trailing vortices go aft (+x).
     """
-    at = p[:, None, :]
-    return _segment(at, a + _FAR, a) + _segment(at, a, b) + _segment(at, b, b + _FAR)
+    ends = [a + _FAR, a, b, b + _FAR]
+    seen = [_seen(p[:, None, :], end) for end in ends]
+    first, bound, last = (_segment(*ends[k : k + 2], *seen[k : k + 2]) for k in range(3))
+    return np.asarray(first + bound + last)
 
 
 def in_cylinder(p: Array, radius: float) -> Array:
