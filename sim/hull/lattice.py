@@ -15,6 +15,8 @@ Array = NDArray[np.float64]
 FINE = (6, 10, 6)
 # Trailing vortices end so far downstream [m]; further makes no difference.
 _FAR = np.array([1e4, 0.0, 0.0])
+# Pairs of control point and vortex worked on at once: their numbers stay in the processor's own memory.
+_BLOCK = 1 << 13
 
 
 @dataclass(frozen=True)
@@ -146,8 +148,13 @@ def in_wall(p: Array, wall: float) -> Array:
 
 def influence(grid: Lattice, image_a: Array, image_b: Array) -> Array:
     """(n, n) normal velocity at the control points of unit vortices with their images."""
-    both = horseshoes(grid.control, grid.a, grid.b) + horseshoes(grid.control, image_a, image_b)
-    return np.asarray(np.einsum("nmi,ni->nm", both, grid.normal))
+    out = np.empty((len(grid.control), len(grid.a)))
+    rows = max(1, _BLOCK // len(grid.a))
+    for low in range(0, len(out), rows):
+        some = slice(low, low + rows)
+        both = horseshoes(grid.control[some], grid.a, grid.b) + horseshoes(grid.control[some], image_a, image_b)
+        out[some] = np.einsum("nmi,ni->nm", both, grid.normal[some])
+    return out
 
 
 def normal_load(circulation: NDArray[Any], a: Array, b: Array, direction: Array) -> Array:
