@@ -22,7 +22,7 @@ class Work:
     dask : Of ``fit``: address of a Dask scheduler whose workers, which see the same folders, read the files,
         reduce their histories and solve the blocks of unknowns.
     workers : Of ``calibrate``: threads; all cores when None. Of ``fit``: processes, of which a second one
-        estimates while the first one checks the runs; one when None, and 0 for one a core.
+        checks the runs while the first one identifies and estimates; one when None, and 0 for one a core.
 
     Examples
     --------

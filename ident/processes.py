@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import functools
 import gc
 import logging
 import multiprocessing
@@ -12,7 +13,7 @@ import sys
 import threading
 import warnings
 from collections.abc import Callable, Iterator
-from typing import TYPE_CHECKING, TypeVar, cast
+from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar, cast
 
 from sim.files import inputs
 
@@ -60,17 +61,49 @@ def unheard() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-def _serve(results: Connection, work: Callable[[], object]) -> None:
-    """Do it, and send the files it read, what it warned of, and what it gave or raised."""
-    serves()
-    # Looking through what the other process holds would copy it.
-    gc.freeze()
+# What a piece of work warned of (message, category, file, line), and what it gave or raised.
+_Done: TypeAlias = tuple[list[tuple[Any, ...]], object]
+
+
+def _done(work: Callable[[], object]) -> _Done:
     with warnings.catch_warnings(record=True) as warned:
         try:
             given = work()
         except Exception as error:
             given = error
-    results.send((inputs.noted(), [(w.message, w.category, w.filename, w.lineno) for w in warned], given))
+    return [(w.message, w.category, w.filename, w.lineno) for w in warned], given
+
+
+def _given(done: _Done) -> Any:
+    warned, given = done
+    for one in warned:
+        warnings.warn_explicit(*one)
+    if isinstance(given, Exception):
+        raise given
+    return given
+
+
+def withheld(work: Callable[[], T]) -> Callable[[], T]:
+    """Work done at once, of which nothing is said before its result is asked for.
+
+    Parameters
+    ----------
+    work : What to do.
+
+    Returns
+    -------
+    A function without arguments that gives the result, raising and warning as ``work`` did.
+    """
+    return functools.partial(_given, _done(work))
+
+
+def _serve(results: Connection, work: Callable[[], object]) -> None:
+    """Do it, and send the files it read, and what came of it."""
+    serves()
+    # Looking through what the other process holds would copy it.
+    gc.freeze()
+    done = _done(work)
+    results.send((inputs.noted(), done))
 
 
 @contextlib.contextmanager
@@ -104,17 +137,13 @@ def meanwhile(work: Callable[[], T], processes: int | None = None) -> Iterator[C
 
     def result() -> T:
         try:
-            read, warned, given = results.recv()
+            read, done = results.recv()
         except (EOFError, OSError):
             _log.warning("a process that worked for this one has ended: its work is done here")
             return work()
         if read is not None:
             inputs.begin(read | (inputs.noted() or frozenset()))
-        for one in warned:
-            warnings.warn_explicit(*one)
-        if isinstance(given, Exception):
-            raise given
-        return cast("T", given)
+        return cast("T", _given(done))
 
     try:
         yield result

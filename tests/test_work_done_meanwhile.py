@@ -8,14 +8,21 @@ import sys
 import time
 import warnings
 from functools import partial
+from pathlib import Path
 
 import pytest
 
 import ident
+from ident.captive.campaign import read_campaign
+from ident.checks.check import check_campaign, seen_in_runs
+from ident.checks.findings import NotYetError, RunsAlone, function_name, registered
+from ident.identification.identify import identify
 from ident.output import check_folder
-from ident.processes import meanwhile
+from ident.processes import meanwhile, withheld
 from sim.files import inputs
 from sim.files.errors import InputError
+
+ROOT = Path(__file__).parents[1]
 
 
 @pytest.fixture(autouse=True)
@@ -119,3 +126,35 @@ def test_a_fit_of_two_processes_is_that_of_one(tmp_path, monkeypatch):
         said.append(str(refused.value))
     assert said[0] == said[1]
     assert "no check finds an error" in said[0]
+
+
+def refuses_after_a_warning():
+    warnings.warn("worn", UserWarning, 1)
+    raise InputError("here", "nothing", "something")
+
+
+def test_what_is_withheld_is_done_at_once_and_said_when_asked_for(recwarn):
+    done = []
+    result = withheld(refuses_after_a_warning)
+    assert withheld(partial(done.append, 1))() is None
+    assert (done, len(recwarn)) == ([1], 0)
+    with pytest.warns(UserWarning, match="worn"), pytest.raises(InputError, match="nothing"):
+        result()
+
+
+@pytest.mark.parametrize("name", ["bb2", "suboff", "kvlcc2-mmg"])
+def test_checks_of_the_runs_alone_are_those_of_identified_runs(name):
+    """Seen before or not, the findings are the same; what looks at the fit is not looked for before it."""
+    folder = ROOT / "raw_captive_data" / name
+    campaign = read_campaign(folder)
+    seen, identified = seen_in_runs(campaign, folder), identify(campaign)
+    assert check_campaign(campaign, folder, identified, seen=seen) == check_campaign(campaign, folder, identified)
+    functions = {function_name(check, one) for check, several in registered().items() for one in several}
+    assert {one for one in functions if one.startswith(("residuals.", "facilities."))}.isdisjoint(seen)
+    assert 0.5 * len(functions) < len(seen) < len(functions)
+
+
+@pytest.mark.parametrize("given", ["fitted", "constants", "derivatives", "between"])
+def test_evidence_before_the_fit_says_that_it_is(given):
+    with pytest.raises(NotYetError, match=given):
+        getattr(RunsAlone(), given)

@@ -6,11 +6,13 @@ derivatives, registered by name; ``data/checks.csv`` holds their limits and reme
 
 from __future__ import annotations
 
+import contextlib
 import os
 import re
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import fields, replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -39,7 +41,17 @@ from ident.checks import rows as checks_rows
 from ident.checks import runs as checks_runs
 from ident.checks import tables as checks_tables
 from ident.checks import zeros as checks_zeros
-from ident.checks.findings import SEVERITIES, Body, Evidence, Finding, registered, rules
+from ident.checks.findings import (
+    SEVERITIES,
+    Body,
+    Evidence,
+    Finding,
+    NotYetError,
+    RunsAlone,
+    function_name,
+    registered,
+    rules,
+)
 from ident.checks.summary import counted, cut, lines
 from ident.identification.identify import Identification, identify
 from ident.output import Tell, silent
@@ -172,22 +184,50 @@ def read_labels(folder: Path) -> pd.DataFrame | None:
     return pd.DataFrame(labels, columns=["sheet", "column", "description", "file", "row"]) if labels else None
 
 
-def findings_of(evidence: Evidence, tell: Tell = silent) -> list[Finding]:
+def findings_of(
+    evidence: Evidence, tell: Tell = silent, seen: Mapping[str, list[Finding]] = MappingProxyType({})
+) -> list[Finding]:
     """Every finding of every check, errors first.
 
     Parameters
     ----------
     evidence : What there is; checks without their evidence find nothing.
     tell : Told of every check.
+    seen : From ``seen_in_runs``: what need not be looked for again.
     """
     # Numbers no boat has must not stop the check that says so.
     with np.errstate(all="ignore"):
         checks = [(name, check) for name, of_name in registered().items() for check in of_name]
         findings: list[Finding] = []
         for done, (name, check) in enumerate(checks, start=1):
-            findings += check(evidence, rules()[name])
+            known = seen.get(function_name(name, check))
+            findings += check(evidence, rules()[name]) if known is None else known
             tell("checking", done, len(checks))
     return sorted(findings, key=lambda f: -SEVERITIES.index(f.severity))
+
+
+def seen_in_runs(campaign: Campaign, folder: Path | None = None) -> dict[str, list[Finding]]:
+    """What checks find that need only the runs, while these are being identified.
+
+    Parameters
+    ----------
+    campaign, folder : As of ``check_campaign``.
+
+    Returns
+    -------
+    Name of a function -> its findings; of a campaign put together from several nothing.
+    """
+    if campaign.members or campaign.runs.empty:
+        return {}
+    given = evidence_of(campaign, folder)
+    evidence = RunsAlone(**{one.name: getattr(given, one.name) for one in fields(given) if one.init})
+    seen = {}
+    with np.errstate(all="ignore"):
+        for name, functions in registered().items():
+            for check in functions:
+                with contextlib.suppress(NotYetError):
+                    seen[function_name(name, check)] = list(check(evidence, rules()[name]))
+    return seen
 
 
 def check_campaign(
@@ -195,6 +235,7 @@ def check_campaign(
     folder: Path | None = None,
     identified: Identification | None = None,
     tell: Tell = silent,
+    seen: Mapping[str, list[Finding]] = MappingProxyType({}),
 ) -> list[Finding]:
     """Quality checks of a campaign, errors first.
 
@@ -205,6 +246,7 @@ def check_campaign(
     identified : Its coefficients, where they are at hand: constant ones are checked as a table
         of derivatives, and identified for it otherwise.
     tell : Told of every check.
+    seen : From ``seen_in_runs`` of the campaign.
     """
     if campaign.members:
         return _of_several(campaign, folder, identified or identify(campaign), tell)
@@ -212,11 +254,10 @@ def check_campaign(
     if not campaign.runs.empty:
         known = identified or identify(campaign)
         values = checks_coefficients.constant_values(known)
-        shares = checks_coefficients.tabulated_values(known)
-        evidence = replace(evidence, fitted=checks_fitted.residuals(known), constants=values, tabulated=shares)
+        evidence = replace(evidence, fitted=checks_fitted.residuals(known), constants=values)
         if not campaign.vehicle.terms_of.tabulated:
             evidence = replace(evidence, derivatives=_of_hull(values))
-    return findings_of(evidence, tell)
+    return findings_of(evidence, tell, seen)
 
 
 # What is asked of several campaigns as a whole; the rest is each one's own.

@@ -190,6 +190,25 @@ class Evidence:
     memo: dict[str, Any] = field(default_factory=dict, init=False, repr=False)
 
 
+class NotYetError(Exception):
+    """A check asks for what only identified runs give, before they are."""
+
+
+class RunsAlone(Evidence):
+    """Evidence before the runs are identified; a check that looks at what they give is told so.
+
+    Raises
+    ------
+    NotYetError
+        For ``fitted``, ``constants``, ``derivatives`` and ``between``.
+    """
+
+    def __getattribute__(self, name: str) -> Any:
+        if name in ("fitted", "constants", "derivatives", "between"):
+            raise NotYetError(name)
+        return super().__getattribute__(name)
+
+
 Function = Callable[[Evidence, Rule], Iterable[Finding]]
 _FUNCTIONS: dict[str, Function] = {}
 
@@ -200,7 +219,7 @@ def check(name: str) -> Callable[[Function], Function]:
         raise KeyError(f"data/checks.csv has no check {name!r}")
 
     def enter(function: Function) -> Function:
-        _FUNCTIONS[f"{name}.{function.__name__}"] = function
+        _FUNCTIONS[function_name(name, function)] = function
         return function
 
     return enter
@@ -209,6 +228,11 @@ def check(name: str) -> Callable[[Function], Function]:
 def registered() -> dict[str, list[Function]]:
     """The functions of every check, in the order of ``data/checks.csv``."""
     return {name: [f for k, f in _FUNCTIONS.items() if k.split(".")[0] == name] for name in rules()}
+
+
+def function_name(name: str, function: Function) -> str:
+    """The name of a function of a check."""
+    return f"{name}.{getattr(function, '__name__', '')}"
 
 
 def together(runs: pd.DataFrame) -> pd.Series:

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 from ident.captive.campaign import Campaign, find_campaigns, read_campaign
 from ident.captive.campaign_file import CampaignFile
 from ident.captive.combine import by_vehicle
-from ident.checks.check import check_campaign, refuse_errors
+from ident.checks.check import check_campaign, refuse_errors, seen_in_runs
 from ident.checks.findings import SEVERITIES, Finding
 from ident.cluster import cluster
 from ident.database.provenance import conversions, run_sources
@@ -28,7 +28,7 @@ from ident.fitting.summary import summary
 from ident.identification.identify import Identification, identify
 from ident.options import Work
 from ident.output import Results, html_table
-from ident.processes import meanwhile
+from ident.processes import meanwhile, withheld
 from ident.text import on_screen
 from sim.files.errors import InputError
 
@@ -258,11 +258,17 @@ def _ready(
     folder: Path, force: str, measured_only: bool, without: Collection[str], work: Work
 ) -> list[tuple[Identification, list[Finding], pd.DataFrame, list[Estimated]]]:
     """Every campaign identified and checked, its rows, and what became of each estimate."""
-    paths, identified = _identified(folder, work)
-    # Beside the checks where the work may have two processes: they take as long.
-    with meanwhile(partial(_every_rows, identified, measured_only, without), work.workers) as rows_of_each:
-        checked = _checked(paths, identified, force, work)
-        rows = rows_of_each()
+    with cluster(work.dask) as spread:
+        paths = find_campaigns(folder)
+        read, paths = by_vehicle([read_campaign(path, tell=work.tell, spread=spread) for path in paths], paths)
+        # Beside the rest where two processes may; a copy would not have the threads of the client of a cluster.
+        processes = None if work.dask else work.workers
+        with meanwhile(partial(_seen, paths, read), processes) as seen:
+            identified = [identify(campaign, work.tell, spread) for campaign in read]
+            # What a check refuses is said before what estimates cannot do with it.
+            estimated = withheld(partial(_every_rows, identified, measured_only, without))
+            checked = _checked(paths, identified, seen(), force, work)
+    rows = estimated()
     for one, (table, _) in zip(identified, rows, strict=True):
         if table.empty:
             nothing = "no run, and no estimate that works without"
@@ -276,17 +282,21 @@ def _log_fit(done: Fit) -> None:
     _log.info("campaign fitted", extra=said)
 
 
-def _identified(folder: Path, work: Work) -> tuple[list[Path], list[Identification]]:
-    """Every campaign read and identified, and where it lies."""
-    paths = find_campaigns(folder)
-    with cluster(work.dask) as spread:
-        read, paths = by_vehicle([read_campaign(path, tell=work.tell, spread=spread) for path in paths], paths)
-        return paths, [identify(campaign, work.tell, spread) for campaign in read]
+def _seen(paths: list[Path], read: list[Campaign]) -> list[dict[str, list[Finding]]]:
+    """What checks see in the runs of every campaign alone."""
+    return [seen_in_runs(campaign, path) for path, campaign in zip(paths, read, strict=True)]
 
 
-def _checked(paths: list[Path], identified: list[Identification], force: str, work: Work) -> list[list[Finding]]:
+def _checked(
+    paths: list[Path],
+    identified: list[Identification],
+    seen: list[dict[str, list[Finding]]],
+    force: str,
+    work: Work,
+) -> list[list[Finding]]:
     """What the checks find in every campaign; an error is refused without a reason."""
-    checked = [check_campaign(one.campaign, path, one, work.tell) for path, one in zip(paths, identified, strict=True)]
+    each = zip(paths, identified, seen, strict=True)
+    checked = [check_campaign(one.campaign, path, one, work.tell, known) for path, one, known in each]
     for one, findings in zip(identified, checked, strict=True):
         _log_checks(one.campaign, findings)
     if not force.strip():
