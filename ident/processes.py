@@ -125,7 +125,8 @@ def meanwhile(work: Callable[[], T], processes: int | None = None) -> Iterator[C
     A function without arguments: waits for the result and gives it, raising what ``work`` raised. What that read and
     warned of is known from then on, as if it was done here then.
     """
-    if sys.platform != "linux" or min(1 if processes is None else processes or cores(), cores()) < 2:
+    allowed = 1 if processes is None else processes or cores()
+    if sys.platform != "linux" or not hasattr(os, "fork") or min(allowed, cores()) < 2:
         yield work
         return
     context = multiprocessing.get_context("fork")

@@ -66,7 +66,7 @@ def assert_law(runs: pd.DataFrame, rel: float = 0.01) -> None:
 def test_the_records_own_frequency_is_used_and_named(tmp_path, off, measured):
     table = record(frequency=FREQUENCY * (1.0 + off))
     table = table if measured else table.drop(columns="displacement_m")
-    reduction = SWAY if measured else SWAY + "amplitude = 0.3\n"
+    reduction = SWAY if measured else SWAY + "amplitude = 0.3\nphase_deg = 0.0\n"
     assert_law(swayed(tmp_path, table, reduction=reduction))
     done = read_campaign(tmp_path)
     found = [f for f in check_campaign(done, tmp_path) if f.check == "motion"]
