@@ -25,7 +25,7 @@ _INSIDE: dict[str, Any] = {"no_cpython_wrapper": True, **_UNCOUNTED}
 CHOSEN: Any = {**_OPTIONS, **_INSIDE}
 CHOSEN_INLINED: Any = {**CHOSEN, "forceinline": True}
 _PACKAGE = Path(__file__).resolve().parent
-# Time to compile the right-hand side and the loop around it [s], said beforehand; in waves so much more.
+# Time to compile the right-hand side and the loop around it [s], said beforehand; in waves so much beside it.
 _CALM, _WAVES = 10, 10
 
 
@@ -192,23 +192,24 @@ class _LazyCache:
 
 
 _LOOPS = {"integrate", "hold", "fill_rate", "step"}
-_ONCE = "once per installation"
+_ONCE, _IN_CALM, _IN_WAVES = "once per installation", "in calm water", "in waves"
 _said: set[str] = set()
 _log = logging.getLogger(__name__)
 
 
-def announce(in_waves: bool, how_often: str = _ONCE) -> None:
-    """Say what takes so long, once a process for each of calm water and waves; whoever begins with waves needs both."""
-    where = "in waves" if in_waves else "in calm water"
-    if where not in _said:
-        seconds = (_WAVES if in_waves else 0) + (0 if "in calm water" in _said else _CALM)
-        _said.update({where, "in calm water"})
-        _log.warning("compiling the right-hand side %s, %s, about %s s", where, how_often, seconds)
+def say_nothing() -> None:
+    """For a process that compiles for another, which says itself what takes so long."""
+    _said.update((_IN_CALM, _IN_WAVES))
 
 
 def _announce(function: Callable[..., Any], sig: Any, how_often: str) -> None:
-    if function.__name__ in _LOOPS:
-        announce("Near(" in str(sig), how_often)
+    """Say what takes so long, once a process for each of calm water and waves."""
+    waves = "Near(" in str(sig)
+    where = _IN_WAVES if waves else _IN_CALM
+    if function.__name__ in _LOOPS and where not in _said:
+        _said.add(where)
+        seconds = _WAVES if waves else _CALM
+        _log.warning("compiling the right-hand side %s, %s, about %s s", where, how_often, seconds)
 
 
 def is_kept(function: Any, *arguments: Any) -> bool:

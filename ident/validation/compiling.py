@@ -34,6 +34,10 @@ def loop_of(case: str | os.PathLike[str] | None) -> Iterator[None]:
     if is_compiled(in_waves):
         yield
         return
-    compiled.announce(in_waves)
-    with meanwhile(partial(compile_loop, in_waves), 0):
+    with meanwhile(partial(_quietly, in_waves), 0):
         yield
+
+
+def _quietly(in_waves: bool) -> None:
+    compiled.say_nothing()
+    compile_loop(in_waves)
