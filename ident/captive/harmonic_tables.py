@@ -69,6 +69,10 @@ def instants(table: pd.DataFrame, source: Source, header: CampaignFile, where: s
     assert source.reduction is not None
     frame, ittc = header.frame.frame, header.frame.angles == "ittc"
     made, motion = [], str(source.reduction.motion)
+    if "frequency" in table and source.reduction.frequency_hz is not None:
+        raise InputError(f"{campaign}, key source.reduction.frequency_hz", "a column frequency too", "one of the two")
+    if "displacement" in table and source.reduction.amplitude is not None:
+        raise InputError(f"{campaign}, key source.reduction.amplitude", "a column displacement too", "one of the two")
     for run in table.to_dict("records"):
         place = f"{where}, row {run['row']}"
         one = Oscillation.of_row({str(k): v for k, v in run.items()})

@@ -7,6 +7,7 @@ fit into the same database, so that no vehicle needs a list of coefficients besi
 from __future__ import annotations
 
 import math
+import re
 
 import pandas as pd
 
@@ -40,8 +41,11 @@ def _term(run: pd.Series, terms: dict[str, Term], place: str) -> Term:
     """The row of the term table a published row names, or a refusal."""
     name = run["coefficient"]
     if name not in terms:
+        # Y_r' of Gertler and Hagen is the factor of u r.
+        alike = next((t for t in (re.sub("_([pqr])$", r"_u\1", name),) if t in terms), "")
         known = ", ".join(t.name for t in terms.values() if not t.axes)
-        raise InputError(f"{place}, column coefficient", repr(name), f"a term of the vehicle's set: {known}")
+        text = f"{alike}, as it is called here" if alike else f"a term of the vehicle's set: {known}"
+        raise InputError(f"{place}, column coefficient", repr(name), text)
     term = terms[name]
     if term.axes or (not term.output and TEST not in term.tests):
         text = "a constant coefficient; tabulated ones are given as runs"

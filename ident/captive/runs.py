@@ -31,7 +31,7 @@ from ident.captive.run_table import REQUIRED, TEXT
 from ident.captive.source import NO_COLUMNS, Reduction, Source, idle_keys
 from ident.captive.stated import Stated, constants, outside_excluded
 from ident.captive.subtract import off_samples, off_table, taken_columns
-from ident.captive.uses import Uses, refuse_idle_quantities
+from ident.captive.uses import Uses, refuse_axes_of_published, refuse_idle_quantities
 from ident.cluster import Spread, here
 from ident.output import Tell, silent
 from sim.boat.catalogue import OUTPUTS
@@ -133,6 +133,7 @@ def _read(
     turned = source.reduction is not None and source.reduction.kind == "oscillatory"
     table = table.assign(file=name, files=source.files, axes="body" if turned else axes_of(source, header))
     refuse_idle_quantities(table)
+    refuse_axes_of_published(table, source, where)
     return outside_excluded(table, source, where), reduced, None, uses
 
 
@@ -254,6 +255,13 @@ def _from_histories(
         # Of a folder "drift_2.5" all is its name.
         name = words_of_run.get("run_id") or (path.name if path.is_dir() else path.stem)
         words_of_run["run_id"] = f"{name}-{part}" if part else name
+        stated = [q for q in numbers if q.startswith("s_")]
+        if stated:
+            text = "rel_sigma, which is added to the error that the record has of itself"
+            raise InputError(f"{where}, key source.constants.sigma{stated[0][1:]}", "declared for a record", text)
+        if "displacement" in numbers:
+            text = "amplitude in [source.reduction], or a column of the record"
+            raise InputError(f"{where}, key source.constants.displacement", "one value for a whole record", text)
         if "frequency" in numbers and rule.frequency_hz is not None:
             raise InputError(f"{where}, key source.reduction.frequency_hz", "frequency stated twice", "one of the two")
         frequency = numbers.get("frequency", rule.frequency_hz)

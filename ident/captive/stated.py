@@ -109,7 +109,10 @@ def constants(folder: Path, path: Path, source: Source) -> tuple[dict[str, str],
             numbers[kind.quantity] = number * kind.factor
             primed |= {kind.quantity} if kind.primed else set()
         elif owner(key):
-            numbers[key] = quantity_of(value, owner(key), place)
+            # A standard error is a column of its load's name: sigma_Y is s_Y.
+            numbers[key.replace("sigma_", "s_", 1) if key.startswith("sigma_") else key] = quantity_of(
+                value, owner(key), place
+            )
         else:
             raise InputError(place, repr(value[:60]), "a quantity, or one of " + ", ".join(TEXT))
     return words, numbers, primed

@@ -99,6 +99,19 @@ class Uses:
             raise InputError(f"{self.where}, key source.normalisation", repr(source.normalisation), text)
 
 
+def refuse_axes_of_published(runs: pd.DataFrame, source: Source, where: str) -> None:
+    """Refuse axes that are stated for published coefficients, which turn with ``[frame]`` and have no flow.
+
+    Raises
+    ------
+    InputError
+        Naming the key.
+    """
+    if source.axes and len(runs) and (runs["test"] == PUBLISHED).all():
+        text = "nothing: published coefficients are along the axes of [frame]"
+        raise InputError(f"{where}, key source.axes", f"{source.axes!r}, declared and unused", text)
+
+
 def base(quantity: str) -> str:
     """The load of a harmonic or a standard error: ``X`` of ``X_in2`` and ``s_X``."""
     return owner(quantity) or quantity
@@ -126,6 +139,14 @@ def refuse_idle_quantities(runs: pd.DataFrame) -> None:
         if name in runs:
             text = "nothing: a published coefficient has no state (U alone, where its unit needs a speed)"
             _refuse(runs, published & runs[name].notna(), name, text)
+    for output in OUTPUTS:
+        if f"s_{output}" in runs:
+            text = "nothing: a published coefficient has sigma_value or rel_sigma"
+            _refuse(runs, published & runs[f"s_{output}"].notna(), f"s_{output}", text)
+    for name, used in (("exclude", ("", "value")), ("decoupled", ("", "False"))):
+        if name in runs:
+            text = f"nothing{' but value' if name == 'exclude' else ''}: a published coefficient has no loads"
+            _refuse(runs, published & ~runs[name].astype(str).str.strip().isin(used), name, text)
     for name in ACCELERATIONS:
         if name in runs:
             text = "zero, or the test acceleration: any other run is steady"

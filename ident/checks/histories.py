@@ -151,8 +151,8 @@ def a_phase_that_nothing_says(evidence: Evidence, rule: Rule) -> Iterator[Findin
     """Oscillations whose displacement is not measured, and whose phase at time zero is not stated."""
     for one in evidence.histories:
         if one.phase_taken:
-            what = f"run {one.run_id}: nothing measures or states the phase of the displacement, taken as zero at time "
-            what += "zero: what it is off by turns damping into added mass"
+            what = f"no phase of run {one.run_id} is measured or stated: the displacement is taken to be zero at "
+            what += "time zero, and what that is off by turns damping into added mass"
             yield rule.finding(one.file, [], ["time"], what)
 
 
@@ -178,11 +178,12 @@ def point_that_may_stay(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
             verdict = arm.verdict(rule.limits["errors"])
             if abs(arm.in_phase) <= rule.limits["share"] * arm.own or verdict == "goes":
                 continue
-            what = f"a moment point that stays while the body moves in {arm.motion} puts {arm.force} times the "
-            what += f"displacement into {arm.moment} in phase, {abs(arm.in_phase):.3g} N m beside {arm.own:.3g}; "
+            stays = f"a point that stays while the body moves in {arm.motion} has {arm.force} times the displacement "
+            stays += f"in it, in phase {abs(arm.in_phase):.3g} N m beside {arm.own:.3g}"
             if verdict:
-                what += f"its third harmonic says that it does: {arm.shown:.3g} of {arm.third:.3g} N m"
+                shown = f"{arm.shown:.3g} of {arm.third:.3g} N m"
+                what = f"the point of {arm.moment} stays, as its third harmonic shows ({shown}): {stays}"
             else:
-                what += "nothing says that it goes along, and the record does not show it"
+                what = f"does the point of {arm.moment} go with the body? Nothing says it, nor does the record: {stays}"
             asked = "warning" if abs(arm.in_phase) > rule.limits["asked"] * arm.own else "info"
             yield rule.finding(one.file, [], [arm.moment], what, "" if verdict else asked)

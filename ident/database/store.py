@@ -126,7 +126,9 @@ def database_rows(identified: Identification) -> pd.DataFrame:
         row |= {k: float(f"{row[k]:.12g}") for k in NUMBERS}
     if not rows:
         name = identified.campaign.header.name
-        raise InputError(name, "the runs identify nothing", "runs of at least one known test")
+        reasons = list(dict.fromkeys(one.reason for one in identified.unused))[:3]
+        why = f"; loads were left out: {'; '.join(reasons)}" if reasons else ""
+        raise InputError(name, f"the runs identify nothing{why}", "runs of at least one known test")
     table = pd.DataFrame(rows).reindex(columns=column_order())
     _check_finite(table, identified.campaign.header.name)
     return table
