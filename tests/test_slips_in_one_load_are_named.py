@@ -130,6 +130,8 @@ SLIPS = {
     "a polynomial's sign": ("kvlcc2", SHIP, value("k_2", -1.0), "open_water", "error", "no end"),
     "a column sorted alone": ("starter", "arm_r.csv", sorted_alone("X_N"), "rows", "warning", "sorted by itself"),
     "pounds for a moment": ("suboff", "published.csv", value("N_v", 4.448), "proportion", "warning", "N_v"),
+    "an estimate's sign": ("suboff", "estimates.csv", value("N_r|r|", -1.0), "proportion", "warning", "N_r|r|"),
+    "a share of a tenth": ("kvlcc2", SHIP, value("gamma_R+", 0.1), "proportion", "warning", "gamma_R+"),
     "degrees for a rate": ("bb2", "estimates.csv", renamed("p_radps", "p_degps"), "proportion", "error", "K_up"),
     "a thrust deduction of the other sign": (
         "bb2", "self_propulsion.csv", times("t", -1.0, slice(3)), "coefficient", "error", "t (propeller)"),

@@ -61,11 +61,12 @@ def values_a_boat_may_have(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
         low, high, basis = _ranges()[name]
         if norms.get(name, "") not in _DIMENSIONLESS:
             low, high = -np.inf, 0.0 if high <= 0.0 else np.inf
-        slack = rule.limits["errors"] * error
+        place = printed_place(runs, [name], part)
+        # What is published is meant as it stands: its error excuses no sign.
+        slack = 0.0 if place[1] else rule.limits["errors"] * error
         # What is left of the resistance beside a thrust says nothing.
         if (low - slack <= value <= high + slack) or (thrust and name.startswith("X_")):
             continue
-        place = printed_place(runs, [name], part)
         what = f"{name} ({part}) = {value:.4g} +- {error:.2g}, boats and ships have {low:g} to {high:g}: {basis}"
         yield rule.finding(place[0], place[1], ["value"] if place[1] else [name], what)
 

@@ -42,7 +42,8 @@ class Proportion:
     ----------
     names : Coefficients of which the first known is judged.
     over : What it is divided by: sums and products of coefficients and of the boat's ``mass``, ``diameter``,
-        ``propeller`` (its diameter) and ``rudder_aspect``, of which the first known is taken.
+        ``propeller`` (its diameter) and ``rudder_aspect``, of which the first known is taken; nothing where the
+        value itself is judged.
     low, high : Between which the quotient is.
     severity : Of a finding.
     sets : Term sets whose terms of that name are meant; all where there is none.
@@ -146,21 +147,22 @@ def coefficients_beside_each_other(evidence: Evidence, rule: Rule) -> Iterator[F
         return
     known = _known(evidence)
     for row in proportions():
-        if row.sets and vehicle.term_set not in row.sets:
-            continue
         name = next((n for n in row.names if n in known), "")
         over = next((o for o in row.over if evaluated(o, known) is not None), "")
-        place = printed_place(evidence.runs, [name]) if name else ("", [])
-        place = (evidence.body.file, []) if name in _SIZES else place
-        if not name or not over or (row.printed and not place[1]):
+        if not name or (row.over and not over) or (row.sets and vehicle.term_set not in row.sets):
             continue
-        severity = beyond(row, known[name], evaluated(over, known) or (0.0, 0.0), rule.limits)
+        place = printed_place(evidence.runs, [name])
+        place = (evidence.body.file, []) if name in _SIZES else place
+        if row.printed and not place[1]:
+            continue
+        base = (evaluated(over, known) if over else None) or (1.0, 0.0)
+        # What is published is meant as it stands: its error excuses no sign and no unit.
+        severity = beyond(row, known[name], base, rule.limits | ({"errors": 0.0} if place[1] else {}))
         if not severity:
             continue
-        value, base = known[name][0], (evaluated(over, known) or (0.0, 0.0))[0]
-        shown = over.replace("*", " ")
-        what = f"{name} = {value:.4g} over {shown} = {base:.4g} is {value / base if base else math.inf:.3g}, "
-        what += f"boats have {row.low:g} to {row.high:g}: {row.basis}"
+        value = known[name][0]
+        quotient = f" over {over.replace('*', ' ')} = {base[0]:.4g} is {value / base[0]:.3g}" if over else ""
+        what = f"{name} = {value:.4g}{quotient}, boats have {row.low:g} to {row.high:g}: {row.basis}"
         yield rule.finding(place[0], place[1], ["value"] if place[1] else [name], what, severity)
 
 
