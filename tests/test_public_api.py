@@ -110,6 +110,11 @@ def test_a_flight_held_against_a_record_makes_no_units_and_draws_nothing(fitted_
     assert not {"pint", "dask", "matplotlib", "scipy.optimize", "scipy.interpolate", "xarray"} & set(modules)
 
 
+def test_a_report_begins_to_draw_before_it_loads_what_it_computes_with():
+    _, modules = _loaded("import ident.report.page, ident.report.interactive")
+    assert not {"numba", "scipy", "matplotlib", "plotly", "ident.captive.campaign"} & set(modules)
+
+
 def _equal(one, other):
     """JSON content without the time stamps of two commits."""
     return json.loads(json.dumps(one)) == json.loads(json.dumps(other))

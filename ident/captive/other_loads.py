@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
-from scipy.special import j1
 
 from ident.captive.campaign_file import CampaignFile, Tare
 from ident.captive.oscillation import HEEL, STOOD, TRIM
@@ -49,6 +48,9 @@ def without_hydrostatics(runs: pd.DataFrame, header: CampaignFile, frame: Frame)
 
 def _swung(angle: Array) -> tuple[Array, Array]:
     """Sine and cosine of A sin(wt) at its ends; of the sine the first harmonic 2 J1(A): the third is left out."""
+    # Imported here: it takes longer than reading most campaigns, few of which need it.
+    from scipy.special import j1
+
     return 2.0 * j1(angle), np.cos(angle)
 
 

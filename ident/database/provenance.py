@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from ident.captive.campaign import Campaign
 from ident.captive.other_loads import tare_applies
 from ident.captive.run_table import MOTION
 from ident.timeseries.reduction import ERROR, TRANSIENT
 from sim.boat.catalogue import OUTPUTS
 from sim.boat.vehicle import Vehicle
 from sim.files.frames import PROGRAM, SENSES
+
+if TYPE_CHECKING:
+    from ident.captive.campaign import Campaign
 
 _TURNED = (*OUTPUTS, *MOTION)
 # Keys of a source that are kept where they are stated.

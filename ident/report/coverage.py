@@ -109,6 +109,8 @@ def coverage(vehicle: Vehicle, rows: pd.DataFrame, factors: dict[str, float]) ->
     rows : Database rows of it.
     factors : Of the standard errors, by word of quality, rising.
     """
+    # Without the long texts of a version.
+    rows = rows[["coefficient", "part", *axis_columns(), "origin", "quality", "worst_residual"]]
     return [_of_term(term, vehicle, rows[rows["coefficient"] == term.name], factors) for term in vehicle_terms(vehicle)]
 
 

@@ -14,12 +14,15 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from ident.drawing import Margins, begun, fixed_labels, place_panels, scientific
 from ident.text import in_figure
 from sim.boat import catalogue
 from sim.boat.catalogue import Term
+from sim.boat.database import axis_columns
 from sim.boat.parts import vehicle_terms
 from sim.boat.vehicle import Vehicle
 from sim.files.frames import PROGRAM
@@ -28,6 +31,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+Array = NDArray[np.float64]
+Places = NDArray[np.int64]
 # From trustworthy (blue, green) to doubtful (red, black); assigned by rising factor.
 _PALETTE = (
     *("#1f4e9c", "#2a9d8f", "#7fb2e5", "#6a994e", "#c9a227", "#8c6d1f"),
@@ -162,38 +167,59 @@ def _shade(i: int, count: int) -> str:
     return str(round(0.75 - 0.6 * (i + 1) / max(count, 1), 3))
 
 
-def _points(axes: Axes, x: Any, rows: pd.DataFrame, marker: str, colours: dict[str, str]) -> None:
+@dataclass(frozen=True)
+class _Columns:
+    """What is drawn of the rows of a panel, as arrays: a group of a table takes longer to take than to draw."""
+
+    value: Array
+    stderr: Array
+    origin: NDArray[np.object_]
+    colour: NDArray[np.object_]
+
+    @classmethod
+    def of(cls, rows: pd.DataFrame, colours: dict[str, str]) -> _Columns:
+        """The columns of rows, and the colour of each by its quality."""
+        value, stderr = (rows[c].to_numpy(float) for c in ("value", "stderr"))
+        colour = np.array([colours.get(q, _SYMMETRY) for q in rows["quality"].tolist()], dtype=object)
+        return cls(value, stderr, rows["origin"].to_numpy(object), colour)
+
+
+def _points(axes: Axes, x: Array, of: _Columns, places: Places, marker: str) -> None:
     """Points, filled when measured and hollow when mirrored."""
-    edges: Any = [colours.get(q, _SYMMETRY) for q in rows["quality"]]
-    faces = [e if o == "measured" else "white" for e, o in zip(edges, rows["origin"], strict=True)]
-    axes.scatter(x, rows["value"], s=15, marker=marker, facecolors=faces, edgecolors=edges, linewidths=0.9, zorder=3)
+    edges: Any = of.colour[places].tolist()
+    faces = [e if o == "measured" else "white" for e, o in zip(edges, of.origin[places], strict=True)]
+    axes.scatter(
+        x[places], of.value[places], s=15, marker=marker, facecolors=faces, edgecolors=edges, linewidths=0.9, zorder=3
+    )
 
 
-def _error_bars(axes: Axes, column: str, rows: pd.DataFrame, colours: dict[str, str]) -> None:
+def _error_bars(axes: Axes, x: Array, of: _Columns) -> None:
     """Standard errors of all lines of a panel, and crosses where symmetry says zero."""
-    zero = rows["origin"] == "symmetry"
+    zero = of.origin == "symmetry"
     if zero.any():
-        axes.plot(rows[column][zero], rows["value"][zero], "x", color=_SYMMETRY, markersize=4.5, zorder=4)
-    rows = rows[~zero]
-    if not rows.empty:
-        edges = [colours.get(q, _SYMMETRY) for q in rows["quality"]]
-        low, high = rows["value"] - rows["stderr"], rows["value"] + rows["stderr"]
-        axes.vlines(rows[column], low, high, colors=edges, linewidth=0.9, zorder=3)
+        axes.plot(x[zero], of.value[zero], "x", color=_SYMMETRY, markersize=4.5, zorder=4)
+    if not zero.all():
+        low, high = (of.value - of.stderr)[~zero], (of.value + of.stderr)[~zero]
+        axes.vlines(x[~zero], low, high, colors=of.colour[~zero].tolist(), linewidth=0.9, zorder=3)
 
 
 def _draw_curve(axes: Axes, panel: Panel, lines: dict[str, list[float]], colours: dict[str, str]) -> None:
     assert panel.x is not None
     axis = catalogue.axes()[panel.x]
-    known = lines.get(panel.line or "", [])
-    groups = panel.rows.groupby(_column(panel.line)) if panel.line else [(None, panel.rows)]
-    for key, group in groups:
-        i = known.index(float(str(key))) if panel.line else 0
-        group = group.sort_values(axis.column)
-        axes.plot(group[axis.column], group["value"], "-", color=_shade(i, len(known)), linewidth=1.0, zorder=2)
-        measured = group[group["origin"] != "symmetry"]
-        if not measured.empty:
-            _points(axes, measured[axis.column], measured, _MARKERS[i % len(_MARKERS)], colours)
-    _error_bars(axes, axis.column, panel.rows, colours)
+    of, x = _Columns.of(panel.rows, colours), panel.rows[axis.column].to_numpy(float)
+    known = lines.get(panel.line or "", [0.0])
+    line = panel.rows[_column(panel.line)].to_numpy(float) if panel.line else np.zeros(len(x))
+    for i, at in enumerate(known):
+        places = np.flatnonzero(line == at)
+        if not places.size:
+            continue
+        places = places[np.argsort(x[places])]
+        shade = _shade(i, len(known) if panel.line else 0)
+        axes.plot(x[places], of.value[places], "-", color=shade, linewidth=1.0, zorder=2)
+        measured = places[of.origin[places] != "symmetry"]
+        if measured.size:
+            _points(axes, x, of, measured, _MARKERS[i % len(_MARKERS)])
+    _error_bars(axes, x, of)
     unit = "" if axis.unit == "1" else f" [{axis.unit}]"
     axes.set_xlabel(f"{axis.name}{unit}")
     axes.set_ylabel(f"{panel.ylabel} [-]")
@@ -348,6 +374,8 @@ def figures_begun(
     A function that gives one picture a group, part and abscissa.
     """
     order = {name: i for i, name in enumerate(vehicle.part_names())}
+    # What is shown, without the long texts of a version, which would be taken and sent with every panel.
+    rows = rows[["coefficient", "part", "output", *axis_columns(), "value", "stderr", "origin", "quality"]]
     rows = rows.sort_values("part", key=lambda part: part.map(order), kind="stable")
     stamp = f"{vehicle.name}, database version {version}; program frame: {PROGRAM}"
     named, jobs = [], []

@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
-from ident.analysis.derivatives import Derivative, checks, derivatives
 from ident.checks.findings import SEVERITIES, spans
 from ident.database.provenance import steps
 from ident.fitting.notes import group_unused, group_warnings, stored_unused, stored_warnings
@@ -38,6 +37,8 @@ from sim.files.toml_files import bundled
 
 if TYPE_CHECKING:
     from jinja2 import Template
+
+    from ident.analysis.derivatives import Derivative
 
 # Prime derivatives do not depend on density and gravity, so both may be anything.
 _UNIT = Environment(density=1.0, gravity=0.0)
@@ -108,6 +109,9 @@ class Signs:
 
 def _signs(coefficients: Coefficients, rows: pd.DataFrame) -> Signs:
     """Derivatives at the largest tabulated speed and depth, where most data are."""
+    # Imported here, when other processes draw already: compiled functions take longer to load than to call.
+    from ident.analysis.derivatives import checks, derivatives
+
     columns = {a: c for c, a in axis_columns().items()}
     speed, depth = (float(rows[columns[a]].max()) for a in ("U", "D0"))
     if not coefficients.vehicle.terms_of.tabulated:

@@ -27,6 +27,10 @@ _ORIGINS = {
 }
 
 
+# Columns that a value is printed from, beside its axes.
+_SHOWN = ("part", "value", "stderr", "origin", "estimated_by", "quality", "calibration", "runs")
+
+
 @dataclass(frozen=True)
 class Run:
     """One captive run behind values of a version.
@@ -168,7 +172,9 @@ def _method(row: Any) -> str:
 
 def _values(term: Term, rows: pd.DataFrame, runs: dict[str, Run]) -> Iterable[Value]:
     columns = [catalogue.axes()[a].column for a in term.axes]
-    for place, row in zip(rows.index, rows.to_dict("records"), strict=True):
+    names = dict.fromkeys([*columns, *_SHOWN])
+    cells = zip(*(rows[name].tolist() for name in names), strict=True)
+    for place, row in zip(rows.index, (dict(zip(names, one, strict=True)) for one in cells), strict=True):
         half = _HALF_95 * row["stderr"]
         yield Value(
             part=row["part"],
@@ -206,6 +212,8 @@ def term_pages(
             drawn.setdefault(symbol, []).append((picture.anchor, picture.title))
     order = ["part", *axis_columns()]
     pages = []
+    # Put in order together: those of a term stay as they would be by themselves.
+    rows = rows[list(dict.fromkeys(["coefficient", *order, *_SHOWN]))].sort_values(order, kind="stable")
     for term in terms:
         of_term = rows[rows["coefficient"] == term.name]
         if of_term.empty:
@@ -218,7 +226,7 @@ def term_pages(
                 _load(term),
                 term.note,
                 tuple(headings[a] for a in term.axes),
-                tuple(_values(term, of_term.sort_values(order, kind="stable"), runs)),
+                tuple(_values(term, of_term, runs)),
                 tuple(drawn.get(term.name, ())),
             )
         )
