@@ -67,11 +67,12 @@ def check_parts(folder: Path, runs: pd.DataFrame, vehicle: Vehicle) -> None:
     for key, group in runs.groupby(["test", "part"], sort=False):
         test, part = map(str, key)
         useful = parts.get(test, {part}) if test != PUBLISHED else {part}
-        beside = runs.loc[(runs["test"] == test) & runs["part"].isin(useful), "file"]
-        alone = group[~group["file"].isin(beside)]
-        if not alone.empty:
-            text = f"{', '.join(sorted(useful))}: no coefficient of another part is identified by {test} runs"
-            raise InputError(at(alone, "part"), f"{part!r}, and its loads would be left out", text)
+        if part not in useful:
+            beside = runs.loc[(runs["test"] == test) & runs["part"].isin(useful), "file"]
+            alone = group[~group["file"].isin(beside)]
+            if not alone.empty:
+                text = f"{', '.join(sorted(useful))}: no coefficient of another part is identified by {test} runs"
+                raise InputError(at(alone, "part"), f"{part!r}, and its loads would be left out", text)
         for lever in ("x", "y", "z"):
             if part not in sections and lever in group and group[lever].notna().any():
                 text = "nothing: levers are those of the vehicle file's sections, which alone are compared"
