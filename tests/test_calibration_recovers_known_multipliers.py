@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from importlib.resources import files
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -14,7 +15,7 @@ from click.testing import CliRunner
 from ident.calibration.crossed import cross_validated, mean_gains
 from ident.calibration.estimate import calibrate
 from ident.calibration.file import apply, load_calibration, parameters
-from ident.calibration.problem import contradictions, problem
+from ident.calibration.problem import Channel, Problem, contradictions, problem
 from ident.calibration.sensitivity import sensitivity as what_decides
 from ident.calibration.version import calibrate as run
 from ident.calibration.version import calibrated_rows
@@ -117,6 +118,22 @@ def test_known_multipliers_come_back_within_their_posterior_errors(estimate, tru
     assert np.abs(away).max() < 3.0
     assert np.abs(estimate.theta - np.array(list(truth.values()))).max() < 0.08
     assert estimate.converged
+
+
+def test_the_search_finds_an_optimum_that_its_beginning_knows_nothing_of():
+    """A flight that does not come to its check angle below a multiplier of 1.1: no derivative at the prior mean."""
+
+    class Step(Problem):
+        def residuals(self, theta):
+            return [np.full(4, 5.0 if theta[0] < 1.1 else theta[0] - 1.3)]
+
+    at = np.linspace(0.0, 1.0, 4)
+    channel = Channel(("case", "CFD", "theta"), at, at, True, 0.1, 0.0, 4.0)
+    group = SimpleNamespace(kind="multiplier")
+    one = SimpleNamespace(mean=1.0, sigma=0.2, group=group)
+    stepped = Step(None, None, [one], {}, [channel], None)
+    assert calibrate(stepped, workers=1, start=stepped.mean).theta[0] == pytest.approx(1.0)
+    assert 1.1 < calibrate(stepped, workers=1).theta[0] < 1.3
 
 
 def test_the_result_does_not_depend_on_the_number_of_workers(task, estimate):

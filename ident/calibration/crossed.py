@@ -103,8 +103,10 @@ def cross_validated(
         def dropped(channel: Channel, name: str = name) -> bool:
             return channel.key[0] == name
 
+        def kept(channel: Channel, name: str = name) -> bool:
+            return channel.key[0] != name
+
         each(f"cross-validation: without {name}")
         rest = calibrate(task.without(dropped), workers, start=whole.theta)
-        left_out = task.without(lambda channel, name=name: channel.key[0] != name)
-        found |= left_out.rms(rest.theta)
+        found |= task.without(kept).rms(rest.theta)
     return [CrossedSeries(*key, before[key], found[key], whole.rms[key]) for key in before]

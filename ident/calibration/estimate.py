@@ -14,6 +14,7 @@ channel, shared by its sources, estimated by maximum likelihood in turn with the
 
 from __future__ import annotations
 
+import math
 import os
 import time
 from collections.abc import Callable, Sequence
@@ -32,6 +33,8 @@ _STEP = 0.05
 _CLOSE = 0.01
 _ROUNDS = 12
 _INNER = 6
+# Draws of the prior of which the most probable is a second place to begin from, and their seed.
+_DRAWN, _SEED = 64, 0
 
 
 @dataclass(frozen=True)
@@ -94,6 +97,23 @@ def discrepancies(channels: list[Channel], rms: Sequence[float]) -> Array:
     return out
 
 
+def log_density(task: Problem, theta: Array) -> float:
+    """Log of the posterior, but for a constant, with the discrepancies at their most likely values.
+
+    Parameters
+    ----------
+    task : From ``ident.calibration.problem.problem``.
+    theta : (k,) multipliers.
+    """
+    if np.any(theta < task.least):
+        return -math.inf
+    square = np.array([float(np.mean(r**2)) for r in task.residuals(theta)])
+    variance = discrepancies(task.channels, np.sqrt(square)) ** 2
+    pieces = np.array([c.pieces for c in task.channels])
+    data = float(np.sum(pieces * (square / variance + np.log(variance))))
+    return -0.5 * (data + float(np.sum(((theta - task.mean) / task.prior) ** 2)))
+
+
 def stack(task: Problem, residuals: list[Array], sigma: Array) -> Array:
     """Residuals with weight so that a series adds pieces * mean square / sigma^2."""
     return np.concatenate(
@@ -137,17 +157,36 @@ def calibrate(
     task : From ``problem``.
     workers : Threads; all cores when None. The result does not depend on it.
     each : Called with a line of text after each round.
-    start : (k,) where the search begins; the prior means when None.
+    start : (k,) where the search begins. When None it begins twice, and the more probable end is taken: at the prior
+        means, and at the most probable of draws of the prior. Where a flight at the means never comes to its check
+        angle, no derivative says that it could.
 
     Returns
     -------
     Estimate; the covariance is that of the least-squares problem at the end.
     """
+    threads = workers or os.cpu_count() or 1
+    if start is not None:
+        return _search(task, start, threads, each)
+    ends = [_search(task, begun, threads, each) for begun in (task.mean, _drawn(task, threads))]
+    return max(ends, key=lambda end: log_density(task, end.theta))
+
+
+def _drawn(task: Problem, threads: int) -> Array:
+    """(k,) the most probable of some draws of the prior."""
+    scatter = np.random.default_rng(_SEED).standard_normal((_DRAWN, len(task.chosen)))
+    draws = np.maximum(task.mean + task.prior * scatter, task.least)
+    with ThreadPoolExecutor(threads) as pool:
+        found = list(pool.map(lambda theta: log_density(task, theta), draws))
+    return np.asarray(draws[int(np.argmax(found))], dtype=np.float64)
+
+
+def _search(task: Problem, start: Array, threads: int, each: Callable[[str], None]) -> Estimate:
+    """The optimum that a search from ``start`` comes to."""
     from scipy.optimize import least_squares
 
     mean, prior, low = task.mean, task.prior, task.least
-    threads = workers or os.cpu_count() or 1
-    theta = (mean if start is None else start).copy()
+    theta = start.copy()
     converged, rounds, moved, began = False, 0, np.inf, time.monotonic()
     sigma = np.ones(len(task.channels))
     for rounds in range(1, _ROUNDS + 1):

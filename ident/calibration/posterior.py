@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ident.calibration.estimate import Estimate, discrepancies
+from ident.calibration.estimate import Estimate, log_density
 from ident.calibration.problem import Problem
 from sim.files.extras import library
 
@@ -109,23 +109,6 @@ def emcee() -> Any:
         When the extra is not installed.
     """
     return library("emcee", "posterior", "--posterior")
-
-
-def log_density(task: Problem, theta: Array) -> float:
-    """Log of the posterior, but for a constant.
-
-    Parameters
-    ----------
-    task : From ``ident.calibration.problem.problem``.
-    theta : (k,) multipliers.
-    """
-    if np.any(theta < task.least):
-        return -math.inf
-    square = np.array([float(np.mean(r**2)) for r in task.residuals(theta)])
-    variance = discrepancies(task.channels, np.sqrt(square)) ** 2
-    pieces = np.array([c.pieces for c in task.channels])
-    data = float(np.sum(pieces * (square / variance + np.log(variance))))
-    return -0.5 * (data + float(np.sum(((theta - task.mean) / task.prior) ** 2)))
 
 
 def _about(centre: Array, covariance: Array) -> Callable[[Array, np.random.RandomState], tuple[Array, Array]]:
