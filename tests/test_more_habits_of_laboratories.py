@@ -264,6 +264,32 @@ def test_a_zip_archive_is_called_one(tmp_path):
         runs_of(tmp_path, "runs.zip")
 
 
+def test_a_tecplot_zone_holds_as_many_points_as_it_says(tmp_path):
+    """Four variables named, three written: twelve hundred numbers would be three hundred points of another thing."""
+    lines = ['TITLE = "x"', 'VARIABLES = "time [s]" "X [N]" "Y [N]" "N [N m]"', 'ZONE T="run", I=400, F=POINT']
+    rows = [" ".join(map(repr, row)) for row in np.column_stack([TIME, SERIES]).tolist()]
+    (tmp_path / "run.dat").write_text("\n".join([*lines, *rows]) + "\n", "utf-8")
+    assert_means(reduced(tmp_path, "run.dat"))
+    short = [row.rsplit(" ", 1)[0] for row in rows]
+    (tmp_path / "run.dat").write_text("\n".join([*lines, *short]) + "\n", "utf-8")
+    with pytest.raises(InputError, match="1200 numbers for 4 variables"):
+        reduced(tmp_path, "run.dat")
+
+
+@pytest.mark.parametrize(("unit", "factor"), [("Newtons", 1.0), ("kN", 1e3), ("a.u.", 1.0)])
+def test_the_units_of_an_lvm_header_are_those_of_its_channels(tmp_path, unit, factor):
+    head = ["LabVIEW Measurement", "Separator\tTab", "***End_of_Header***\t", "", "Channels\t3"]
+    head += [f"Y_Unit_Label\t{unit}\t{unit}\tNm", "***End_of_Header***\t", "X_Value\tFx\tFy\tMz\tComment"]
+    table = np.column_stack([TIME, SERIES[:, :2] / factor, SERIES[:, 2]]).tolist()
+    lines = [*head, *("\t".join(map(repr, row)) + "\t" for row in table)]
+    (tmp_path / "run.lvm").write_text("\n".join(lines) + "\n", "utf-8")
+    names = 'ignore = ["Comment"]\n[source.columns]\nX_Value = "time [s]"\nMz = "N"\nFx = "X{0}"\nFy = "Y{0}"\n'
+    assert_means(reduced(tmp_path, "run.lvm", names.format("" if unit != "a.u." else " [N]")))
+    if unit == "kN":
+        with pytest.raises(InputError, match="unit 'kN', declared as 'N'"):
+            reduced(tmp_path, "run.lvm", names.format(" [N]"))
+
+
 # -- names of files -----------------------------------------------------------------------------
 
 

@@ -247,6 +247,11 @@ def unit_words() -> frozenset[str]:
     return frozenset(listed | set(_other_spellings()) | set(_other_spellings().values()))
 
 
+def known_unit(text: str) -> bool:
+    """Whether some quantity is read in this unit."""
+    return text not in NO_UNIT and any(factor(quantity, text) is not None for quantity in units())
+
+
 def is_unit(text: str) -> bool:
     """Whether some quantity has this unit, or pint knows it, capitals or not."""
     if text in NO_UNIT or text in _other_spellings() or any(text in choices for choices in units().values()):

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
+from ident.captive.quantities import known_unit
 from ident.captive.readers.arrays import array_sheet, chosen, needs, of_one_length, with_units
 from ident.captive.readers.sheet import Sheet
 from ident.captive.readers.table import open_csv
@@ -65,7 +67,7 @@ def _unit(properties: dict[str, object]) -> str:
 
 
 def open_lvm(path: Path, source: Source) -> Sheet:
-    """A LabVIEW measurement file: the table below its last header, tabs or commas as the header says.
+    """A LabVIEW measurement file: the table below its last header, tabs or commas and units as the header says.
 
     Raises
     ------
@@ -88,4 +90,9 @@ def open_lvm(path: Path, source: Source) -> Sheet:
         raise InputError(
             sheet.where, "an X_Value for each channel", "one X column (X_Columns One), or a file a channel"
         )
-    return sheet
+    units = next((line for line in reversed(first.text[: ends[-1]]) if line.startswith("Y_Unit_Label")), "")
+    stated = [u.strip() for u in units.split(separator)[1:]]
+    at = 1 if sheet.header[:1] == ["X_Value"] else 0
+    beside = [""] * at + [u if known_unit(u) else "" for u in stated]
+    beside += [""] * (len(sheet.header) - len(beside))
+    return replace(sheet, header=with_units(sheet.header, beside[: len(sheet.header)], source))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import math
 import re
 import shlex
 from pathlib import Path
@@ -110,6 +111,7 @@ def open_tecplot(path: Path, source: Source) -> Sheet:
     """
     names: list[str] = []
     zones: dict[str, tuple[str, list[float], int]] = {}
+    points: dict[str, dict[str, int]] = {}
     key, place = "", 0
     listing = False
     for block in blocks(path, source.encoding, comments=("#",), skip=source.skip):
@@ -131,6 +133,8 @@ def open_tecplot(path: Path, source: Source) -> Sheet:
                     zones[key] = ("POINT", [], row)
                 packed = re.search(r"(?i)(?:DATAPACKING|\bF)\s*=\s*(?:FE)?(POINT|BLOCK)", text)
                 zones[key] = (packed[1].upper() if packed else zones[key][0], *zones[key][1:])
+                sizes = re.findall(r"\b([IJK])\s*=\s*(\d+)", re.sub(r'"[^"]*"', "", text).upper())
+                points.setdefault(key, {}).update({axis: int(size) for axis, size in sizes})
             else:
                 if not names:
                     raise InputError(f"{path}, row {row}", repr(text[:40]), 'VARIABLES = "..." before any number')
@@ -145,7 +149,8 @@ def open_tecplot(path: Path, source: Source) -> Sheet:
             place = row
     name = chosen(path, list(zones), source, "zone")
     packing, values, row = zones[name]
-    if not names or not values or len(values) % len(names):
+    stated = math.prod(points.get(name, {}).values()) * len(names) if points.get(name) else len(values)
+    if not names or not values or len(values) % len(names) or len(values) != stated:
         wrong = f"{len(values)} numbers for {len(names)} variables in zone {name!r}"
         raise InputError(f"{path}, rows {row} to {place}", wrong, "as many of each variable")
     table = np.array(values).reshape((-1, len(names)) if packing == "POINT" else (len(names), -1))
