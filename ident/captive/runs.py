@@ -255,10 +255,10 @@ def _from_histories(
         # Of a folder "drift_2.5" all is its name.
         name = words_of_run.get("run_id") or (path.name if path.is_dir() else path.stem)
         words_of_run["run_id"] = f"{name}-{part}" if part else name
-        stated = [q for q in numbers if q.startswith("s_")]
-        if stated:
+        own_error = next((q for q in numbers if q.startswith("s_")), "")
+        if own_error:
             text = "rel_sigma, which is added to the error that the record has of itself"
-            raise InputError(f"{where}, key source.constants.sigma{stated[0][1:]}", "declared for a record", text)
+            raise InputError(f"{where}, key source.constants.sigma{own_error[1:]}", "declared for a record", text)
         if "displacement" in numbers:
             text = "amplitude in [source.reduction], or a column of the record"
             raise InputError(f"{where}, key source.constants.displacement", "one value for a whole record", text)
