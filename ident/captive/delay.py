@@ -79,10 +79,7 @@ def of_loads(
         return None
     t, w = _means(time, step, n), _means(weight, step, n)
     inside = (t > t[0] + 0.5 * period) & (t < t[-1] - 0.5 * period)
-    apart = np.diff(t)
-    # A spline through samples that lie close together here and far apart there has no second derivative to go by.
-    even = float(apart.max()) < _UNEVEN * float(np.median(apart)) and float(apart.min()) * _UNEVEN > np.median(apart)
-    if np.median(apart) > period / _PER_PERIOD or inside.sum() < 4 * _PER_PERIOD or not even:
+    if not _even(np.diff(t), period / _PER_PERIOD) or inside.sum() < 4 * _PER_PERIOD:
         return None
     # Few records need them, and they are slow to load.
     from scipy.interpolate import CubicSpline
@@ -118,6 +115,12 @@ def of_loads(
     others = (rests / noise).sum(axis=1)[np.abs(grid - tau) > 2.0 * _STEP * period] - left(tau)
     alone = bool((others > _SURE**2 * correlated).all())
     return Delay(f"the loads {' '.join(loads)}", tau, error) if alone and error < _SEEN * period else None
+
+
+def _even(apart: Array, longest: float) -> bool:
+    """Whether steps are short, and no spline is laid through samples close together here and far apart there."""
+    usual = float(np.median(apart))
+    return usual <= longest and float(apart.max()) < _UNEVEN * usual < _UNEVEN**2 * float(apart.min())
 
 
 def _residual(moved: CubicSpline, at: Array, root: Array, y: Array) -> Array:
