@@ -71,9 +71,9 @@ def extrapolation(draft: Draft) -> str:
     said = []
     for term in vehicle_terms(draft.vehicle):
         reached = _axis(term, speed, length) if np.isfinite(speed) else None
-        chosen = draft.where([_escaped(term.name)])
-        if reached is None or not chosen.any():
+        if reached is None or not draft.has(term.name):
             continue
+        chosen = draft.where([_escaped(term.name)])
         axis, far = reached
         place = np.abs(draft.axis(axis))
         inside = chosen & (place > 0.0)
