@@ -149,6 +149,18 @@ def test_a_value_that_stands_often_and_far_away_is_left_out(tmp_path, value, sha
     assert "clipped" not in run["reduction"]
 
 
+@pytest.mark.parametrize("spikes", [0, 1, 2])
+@pytest.mark.parametrize("value", [-0.12, 123.456, 0.0])
+def test_a_constant_channel_is_not_clipped_by_a_spike_in_it(tmp_path, spikes, value):
+    constant = np.full(400, value)
+    constant[[150, 320][:spikes]] = 5.0
+    frame = pd.DataFrame(np.column_stack([TIME, SERIES, constant]), columns=["time_s", "X_N", "Y_N", "N_Nm", "Z_N"])
+    frame.to_csv(tmp_path / "run.csv", index=False)
+    words = reduced(tmp_path, "run.csv")["reduction"].iloc[0]
+    assert "clipped" not in words
+    assert "window 0-19.95 s" in words
+
+
 @pytest.mark.parametrize("leap", [50.0, 1e5])
 @pytest.mark.parametrize("at", [200, 399])
 def test_the_sample_behind_a_gap_of_the_clock_does_not_stand_for_it(tmp_path, leap, at):

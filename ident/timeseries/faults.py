@@ -251,14 +251,17 @@ class _Learning:
         size = max(abs(low), abs(high))
         channel.sentinels = (*stated, *(v for v in self.nines if abs(v) > BEYOND * size))
         channel.often = tuple(often)
-        room = max(_FAR * (high - low), 0.01 * size)
-        if size > 0.0 and self.count > _AROUND:
+        # Of a channel that stands at zero what is beyond is told by its own size.
+        room = max(_FAR * (high - low), 0.01 * size) or 1e-3 * max(abs(end.first) for end in self.ends)
+        if room > 0.0 and self.count > _AROUND:
             channel.low, channel.high = low - room, high + room
         repeats = min(max(self.equal / max(self.equal + self.steps, 1), 1e-12), 1.0 - 1e-12)
         channel.longest = max(_RUN, math.ceil(math.log(_CHANCE / max(self.count, 1)) / math.log(repeats)))
         for end, word in zip(self.ends, ("largest", "smallest"), strict=True):
             value = end.sign * end.first
-            if end.clipped() and value not in channel.sentinels and channel.low <= value <= channel.high:
+            # Of a constant channel with a spike nothing is cut off: no other value is inside.
+            inside = all(channel.low <= v <= channel.high for v in (value, end.sign * end.second))
+            if end.clipped() and value not in channel.sentinels and inside:
                 channel.at_limit, channel.apart = end.firsts, end.first - end.second > _APART * (high - low)
                 channel.clipped = f"{end.firsts} of {self.count} samples are the {word} value {value:g}"
         return channel
