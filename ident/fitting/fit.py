@@ -120,7 +120,8 @@ def given_of(campaign: Campaign) -> Given:
     }
     shared = []
     for one in header.shared_error:
-        chosen = runs[runs["test"].isin(one.tests or runs["test"]) & runs["part"].isin(one.parts or runs["part"])]
+        chosen = runs[runs["test"].isin(one.tests)] if one.tests else runs
+        chosen = chosen[chosen["part"].isin(one.parts)] if one.parts else chosen
         if chosen.empty:
             where = f"{header.name}, key shared_error, {one.name}"
             raise InputError(where, f"no run of {' '.join(one.tests + one.parts)}", "tests and parts of the campaign")
