@@ -7,6 +7,7 @@ import signal
 import sys
 import time
 import warnings
+from dataclasses import fields
 from functools import partial
 from pathlib import Path
 
@@ -14,8 +15,8 @@ import pytest
 
 import ident
 from ident.captive.campaign import read_campaign
-from ident.checks.check import check_campaign, seen_in_runs
-from ident.checks.findings import NotYetError, RunsAlone, function_name, registered
+from ident.checks.check import check_campaign, evidence_of, seen_in_runs
+from ident.checks.findings import OF_FIT, NotYetError, RunsAlone, function_name, registered
 from ident.identification.identify import identify
 from ident.output import check_folder
 from ident.processes import meanwhile, withheld
@@ -154,7 +155,20 @@ def test_checks_of_the_runs_alone_are_those_of_identified_runs(name):
     assert 0.5 * len(functions) < len(seen) < len(functions)
 
 
-@pytest.mark.parametrize("given", ["fitted", "constants", "derivatives", "between"])
+@pytest.mark.parametrize("name", ["bb2", "suboff"])
+def test_all_that_checks_are_given_of_a_fit_is_what_they_are_not_given_before(name, monkeypatch):
+    """Whatever a fit is to say to the checks from now on has to be named where evidence before it refuses it."""
+    folder = ROOT / "raw_captive_data" / name
+    campaign, given = read_campaign(folder), []
+    monkeypatch.setattr("ident.checks.check.findings_of", lambda evidence, *more: given.append(evidence) or [])
+    check_campaign(campaign, folder, identify(campaign))
+    before = evidence_of(campaign, folder)
+    said = {f.name for f in fields(before) if getattr(given[0], f.name) is not getattr(before, f.name)}
+    assert {"fitted", "constants", "tabulated"} <= said - {"runs"}
+    assert {name for name in said if getattr(before, name) in (None, ())} <= set(OF_FIT)
+
+
+@pytest.mark.parametrize("given", ["fitted", "constants", "tabulated", "derivatives", "between"])
 def test_evidence_before_the_fit_says_that_it_is(given):
     with pytest.raises(NotYetError, match=given):
         getattr(RunsAlone(), given)

@@ -254,7 +254,8 @@ def check_campaign(
     if not campaign.runs.empty:
         known = identified or identify(campaign)
         values = checks_coefficients.constant_values(known)
-        evidence = replace(evidence, fitted=checks_fitted.residuals(known), constants=values)
+        shares = checks_coefficients.tabulated_values(known)
+        evidence = replace(evidence, fitted=checks_fitted.residuals(known), constants=values, tabulated=shares)
         if not campaign.vehicle.terms_of.tabulated:
             evidence = replace(evidence, derivatives=_of_hull(values))
     return findings_of(evidence, tell, seen)

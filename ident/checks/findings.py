@@ -190,6 +190,10 @@ class Evidence:
     memo: dict[str, Any] = field(default_factory=dict, init=False, repr=False)
 
 
+# What only identified runs give: nobody else may say it to the checks.
+OF_FIT = ("fitted", "constants", "tabulated", "derivatives", "between")
+
+
 class NotYetError(Exception):
     """A check asks for what only identified runs give, before they are."""
 
@@ -200,11 +204,11 @@ class RunsAlone(Evidence):
     Raises
     ------
     NotYetError
-        For ``fitted``, ``constants``, ``derivatives`` and ``between``.
+        For what is of the fit: ``OF_FIT``.
     """
 
     def __getattribute__(self, name: str) -> Any:
-        if name in ("fitted", "constants", "derivatives", "between"):
+        if name in OF_FIT:
             raise NotYetError(name)
         return super().__getattribute__(name)
 
