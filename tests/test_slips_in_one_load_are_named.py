@@ -128,6 +128,7 @@ SLIPS = {
     "thrust over rpm": ("remus100", "published.csv", value("X_nn", 100.0), "proportion", "error", "X_nn"),
     "a rudder in degrees": ("kvlcc2", SHIP, value("f_alpha", 0.25), "proportion", "warning", "f_alpha"),
     "a polynomial's sign": ("kvlcc2", SHIP, value("k_2", -1.0), "open_water", "error", "no end"),
+    "knots": ("starter", "stern_planes.csv", renamed("U_mps", "U_kts"), "proportion", "warning", "Z_deltas"),
     "a column sorted alone": ("starter", "arm_r.csv", sorted_alone("X_N"), "rows", "warning", "sorted by itself"),
     "pounds for a moment": ("suboff", "published.csv", value("N_v", 4.448), "proportion", "warning", "N_v"),
     "an estimate's sign": ("suboff", "estimates.csv", value("N_r|r|", -1.0), "proportion", "warning", "N_r|r|"),
