@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +17,9 @@ import pytest
 from sample_of_mutations import STARTER, TABLES
 
 from ident.captive.campaign import read_campaign
-from ident.checks.check import check_campaign
+from ident.checks.check import check_campaign, evidence_of
+from ident.checks.findings import rules
+from ident.checks.possible import point_beside_the_body
 from ident.checks.propeller import ideal_efficiency
 from ident.checks.ratios import Proportion, beyond, evaluated, proportions
 from sim.boat.catalogue import SETS, terms
@@ -128,6 +131,7 @@ SLIPS = {
     "thrust over rpm": ("remus100", "published.csv", value("X_nn", 100.0), "proportion", "error", "X_nn"),
     "a rudder in degrees": ("kvlcc2", SHIP, value("f_alpha", 0.25), "proportion", "warning", "f_alpha"),
     "a polynomial's sign": ("kvlcc2", SHIP, value("k_2", -1.0), "open_water", "error", "no end"),
+    "one J astern": ("starter", "open_water.csv", put("J", 1, "-0.2"), "open_water", "warning", "its sign"),
     "knots": ("starter", "stern_planes.csv", renamed("U_mps", "U_kts"), "proportion", "warning", "Z_deltas"),
     "a column sorted alone": ("starter", "arm_r.csv", sorted_alone("X_N"), "rows", "warning", "sorted by itself"),
     "pounds for a moment": ("suboff", "published.csv", value("N_v", 4.448), "proportion", "warning", "N_v"),
@@ -208,3 +212,12 @@ def test_a_propeller_of_another_boat_is_named_where_it_stands(place):
     folder = path.parent / "captive"
     (one,) = [f for f in check_campaign(read_campaign(folder), folder) if "propeller = 0.2" in f.what]
     assert (one.check, one.severity, one.file) == ("proportion", "warning", "vehicle my-boat")
+
+
+@pytest.mark.parametrize(("point", "named"), [({}, 0), ({"y_m": 20.0}, 1), ({"x_m": 3.0}, 0), ({"z_m": -30.0}, 1)])
+def test_a_moment_point_beside_the_body_is_an_error(place, point, named):
+    campaign = read_campaign(place("starter"))
+    moved = campaign.header.moment_point.model_copy(update=point)
+    evidence = evidence_of(replace(campaign, header=campaign.header.model_copy(update={"moment_point": moved})))
+    found_ = list(point_beside_the_body(evidence, rules()["moment_point"]))
+    assert [f.severity for f in found_] == ["error"] * named

@@ -85,6 +85,20 @@ def boats_in_the_air(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
         yield rule.finding(str(file), rows_of(group), ["D0"], f"{what}: D0 is positive down", severity)
 
 
+@check("moment_point")
+def point_beside_the_body(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
+    """A moment point farther from the vehicle's origin than the tested body is long, or half as long to the side."""
+    campaign = evidence.campaign
+    if campaign is None:
+        return
+    point, length = campaign.header.moment_point, campaign.header.scale.length_m
+    for axis, value in (("x_m", point.x_m), ("y_m", point.y_m), ("z_m", point.z_m)):
+        most = rule.limits["along" if axis == "x_m" else "aside"]
+        if abs(value) > most * length:
+            what = f"{axis} = {value:g} of a body of {length:g} m: no balance and no mesh has its point there"
+            yield rule.finding("campaign.toml", [], [f"moment_point.{axis}"], what)
+
+
 @check("errors")
 def errors_that_leave_nothing(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
     """Relative errors of more than all of a load: per cent for a fraction."""

@@ -54,6 +54,17 @@ def energy_of_the_wake(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
 
 
 @check("open_water")
+def one_advance_below_zero(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
+    """A single J below zero in a curve of positive ones: nobody measures one point astern."""
+    tested = evidence.runs[evidence.runs["test"] == "open_water"]
+    for file, group in tested.groupby("file", sort=False):
+        astern = group[group["J"] < 0.0]
+        if len(astern) == 1 and int((group["J"] > 0.0).sum()) >= rule.limits["ahead"]:
+            what = f"J = {astern['J'].iloc[0]:g} in run {astern['run_id'].iloc[0]}, all others ahead: its sign?"
+            yield rule.finding(str(file), rows_of(astern), ["J"], what, "warning")
+
+
+@check("open_water")
 def thrust_over_advance(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
     """The mean slope of KT over J, which the pitch hardly changes: J of another unit, or one column shifted."""
     runs, limits = evidence.runs, rule.limits
