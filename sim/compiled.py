@@ -26,7 +26,7 @@ CHOSEN: Any = {**_OPTIONS, **_INSIDE}
 CHOSEN_INLINED: Any = {**CHOSEN, "forceinline": True}
 _PACKAGE = Path(__file__).resolve().parent
 # Time to compile the right-hand side and the loop around it [s], said beforehand; in waves so much beside it.
-_CALM, _WAVES = 10, 10
+_CALM, _WAVES = 10, 20
 
 
 class _Locator:

@@ -47,7 +47,7 @@ def fallen(measured: dict[str, float]) -> list[str]:
             continue
         now = measured[line.name]
         if line.name == "batch_efficiency" and "free_cores" in measured:
-            # Other work on the machine takes its share of the cores.
+            # Other work on the machine takes its share of the cores, and two threads of one core are not two.
             now *= measured["cores"] / measured["free_cores"]
         gain = now / line.value if line.better == "more" else line.value / now
         if not gain >= 1.0 - SLACK:

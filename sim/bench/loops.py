@@ -1,4 +1,4 @@
-"""Loops that are timed, compiled like those of a simulation."""
+"""Loops that are timed, compiled like those of a simulation: other threads go on beside them."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from sim.kernel.rhs import FROM_STATE, fill_rate, step
 from sim.waves.surroundings import near_of, prepare
 
 
-@njit
+@njit(nogil=True)
 def rates(
     m: np.ndarray, w: np.ndarray, states: np.ndarray, controls: np.ndarray, s: np.ndarray, k: np.ndarray, dy: np.ndarray
 ) -> None:
@@ -19,7 +19,7 @@ def rates(
         fill_rate(m, w, states[i], controls[i], (), s, k, dy)
 
 
-@njit
+@njit(nogil=True)
 def steps(
     m: np.ndarray,
     w: np.ndarray,

@@ -128,7 +128,7 @@ def ratios(tries: int = 300, say: Callable[[str], None] = lambda text: None) -> 
     say(f"{FLIGHTS} flights")
     flight_steps, vehicle = samples_of(case)[0], coefficients.vehicle
     one_flight = shortest({"flight": lambda: fly(case, vehicle, model, None)}, max(tries // 10, 3))["flight"]
-    free = _busy(partial(_voyages, model, states, controls, h), os.cpu_count() or 1)[1]
+    free = _free_cores(partial(_voyages, model, states, controls, h))
     elapsed, busy = _busy(lambda k: fly(case, vehicle, model, None), FLIGHTS)
     batch, alone = FLIGHTS * flight_steps / elapsed, flight_steps / one_flight
     return {
@@ -157,6 +157,12 @@ def _busy(call: Callable[[int], object], times: int) -> tuple[float, float]:
         list(pool.map(call, range(times)))
     elapsed = time.perf_counter() - start
     return elapsed, (time.process_time() - used) / elapsed
+
+
+def _free_cores(call: Callable[[int], object]) -> float:
+    """How many calls side by side get done in the time of one: fewer than cores beside other work or half cores."""
+    cores = os.cpu_count() or 1
+    return cores * _busy(call, 1)[0] / _busy(call, cores)[0]
 
 
 def fleets(boats: int = FLIGHTS, samples: int = 40) -> dict[str, float]:
