@@ -21,6 +21,7 @@ from ident.calibration.version import calibrate as run
 from ident.calibration.version import calibrated_rows
 from ident.cli import main
 from ident.options import Diagnostics
+from ident.report.page import write_report
 from sim.boat.coefficients import Coefficients
 from sim.boat.database import own_version, read_rows, versions
 from sim.boat.row_codec import correlation_matrix
@@ -183,6 +184,10 @@ def test_calibrating_twice_gives_the_same_version(folder, fitted_db, tmp_path, r
     assert kept["groups"][0]["beyond_captive"]
     captive, _ = read_rows(db, 0, "bb2")
     assert sorted(captive["value"]) == sorted(rows["value"])
+    # The page of a calibration without draws has its groups, and nothing of draws.
+    page = Path(write_report(db, first.version, tmp_path, "bb2").file).read_text("utf-8")
+    assert all(f">{g['title']}</th>" in page for g in kept["groups"])
+    assert "Posterior by draws" not in page
 
 
 def test_sources_that_contradict_one_another_are_named(folder, campaign, rows, truth, tmp_path):
