@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ident.calibration.estimate import Estimate, calibrate
+from ident.calibration.estimate import Estimate, left_out
 from ident.calibration.problem import Channel, Problem
 from sim.files.errors import InputError
 
@@ -103,10 +103,6 @@ def cross_validated(
         def dropped(channel: Channel, name: str = name) -> bool:
             return channel.key[0] == name
 
-        def kept(channel: Channel, name: str = name) -> bool:
-            return channel.key[0] != name
-
         each(f"cross-validation: without {name}")
-        rest = calibrate(task.without(dropped), workers, start=whole.theta)
-        found |= task.without(kept).rms(rest.theta)
+        found |= left_out(task, whole, dropped, workers)[1]
     return [CrossedSeries(*key, before[key], found[key], whole.rms[key]) for key in before]

@@ -176,6 +176,25 @@ def calibrate(
     return second if better else first
 
 
+def left_out(
+    task: Problem, whole: Estimate, dropped: Callable[[Channel], bool], workers: int | None = None
+) -> tuple[Estimate, dict[Key, float]]:
+    """A calibration without some of the series, and what it predicts of these.
+
+    Parameters
+    ----------
+    task, whole : The problem, and its optimum, where the search begins.
+    dropped : Whether a series is left out; some must stay.
+    workers : As of ``calibrate``.
+
+    Returns
+    -------
+    The optimum of the rest, and for each series left out its root mean square residual there.
+    """
+    rest = calibrate(task.without(dropped), workers, start=whole.theta)
+    return rest, task.without(lambda channel: not dropped(channel)).rms(rest.theta)
+
+
 def _drawn(task: Problem, threads: int) -> Array:
     """(k,) the most probable of some draws of the prior."""
     scatter = np.random.default_rng(_SEED).standard_normal((_DRAWN, len(task.chosen)))

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ident.calibration.cautions import UNLEARNT, cautions
 from ident.calibration.crossed import cross_validated, maneuvers
-from ident.calibration.estimate import Estimate
+from ident.calibration.estimate import Estimate, left_out
 from ident.calibration.estimate import calibrate as most_probable
 from ident.calibration.file import CalibrationFile, Parameter, apply, load_calibration, parameters
 from ident.calibration.posterior import emcee, sample
@@ -117,15 +117,11 @@ def _left_out(task: Problem, whole: Estimate, workers: int | None, each: Callabl
         def dropped(channel: Channel, out: tuple[str, str] = out) -> bool:
             return channel.key[:2] == out
 
-        rest = task.without(dropped)
-        if not rest.channels:
+        if all(map(dropped, task.channels)):
             continue
         each(f"without {out[0]} {out[1]}")
-        estimate = most_probable(rest, workers, lambda text: None, whole.theta)
-        residuals = task.residuals(estimate.theta)
-        predicted = {
-            c.key[2]: float(np.sqrt(np.mean(r**2))) for c, r in zip(task.channels, residuals, strict=True) if dropped(c)
-        }
+        estimate, found = left_out(task, whole, dropped, workers)
+        predicted = {key[2]: error for key, error in found.items()}
         shift = (estimate.theta - whole.theta) / np.maximum(estimate.deviation, whole.deviation)
         trained = {k[2]: v for k, v in whole.rms.items() if k[:2] == out}
         values, sigmas, shifts = ([float(x) for x in vector] for vector in (estimate.theta, estimate.deviation, shift))

@@ -14,6 +14,7 @@ from ident.captive.run_table import STATES
 from ident.checks.findings import Array, Evidence, Finding, Rule, check, declared, kept, milder, spans
 from sim.boat.catalogue import MIRROR_OUTPUT, MIRRORED_FACTORS, OUTPUTS
 from sim.boat.vehicle import Vehicle
+from sim.files.columns import places_of
 
 # Digits in which two copies agree after they went through a spreadsheet.
 _AGREE = 6
@@ -223,10 +224,7 @@ def _alike(runs: pd.DataFrame, output: str, rule: Rule) -> list[NDArray[np.int64
     value = _rounded(runs[output].to_numpy(float)[usable])
     _, key, size = np.unique(np.stack([which, value]), axis=1, return_inverse=True, return_counts=True)
     many = (size[key] > 1) & (size[key] >= np.array(least)[which])
-    groups: dict[int, list[int]] = {}
-    for place, number in zip(usable[many].tolist(), key[many].tolist(), strict=True):
-        groups.setdefault(number, []).append(place)
-    return [np.array(group) for group in groups.values()]
+    return [usable[many][group] for group in places_of(key[many].tolist()).values()]
 
 
 def _beyond_chance(count: int, shown: int, chance: float) -> int:

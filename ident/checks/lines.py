@@ -10,8 +10,8 @@ from ident.checks.physics import slope
 from sim.files.errors import InputError
 from sim.hull.derivatives import Derivative, derivatives
 
-# Test, angle, load -> derivative by the lines.
-_SLOPES = (
+# Test, angle, load -> name of its slope in prime form.
+SLOPES = (
     ("drift_horizontal", "beta", "Y", "Y_v"),
     ("drift_horizontal", "beta", "N", "N_v"),
     ("drift_vertical", "alpha", "Z", "Z_w"),
@@ -42,7 +42,7 @@ def against_the_lines(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
         return
     out: dict[str, float] = {}
     files: set[str] = set()
-    for test, angle, output, name in _SLOPES:
+    for test, angle, output, name in SLOPES:
         of_test = runs[(runs["test"] == test) & runs["part"].isin(["", "hull"])]
         value = slope(of_test, angle, output, body)
         if not math.isfinite(value) or value == 0.0:

@@ -13,21 +13,13 @@ from importlib.resources import files
 import numpy as np
 
 from ident.checks.findings import HULL, Evidence, Finding, Rule, check, printed_place
+from ident.checks.lines import SLOPES
 from ident.checks.physics import slope
 from ident.checks.resistance import spheroid_diameter
 from sim.boat.parts import vehicle_terms
 
 # Value and standard error.
 Known = Mapping[str, tuple[float, float]]
-# Test, angle, load -> name of its slope in prime form.
-_SLOPES = (
-    ("drift_horizontal", "beta", "Y", "Y_v"),
-    ("drift_horizontal", "beta", "N", "N_v"),
-    ("drift_vertical", "alpha", "Z", "Z_w"),
-    ("drift_vertical", "alpha", "M", "M_w"),
-)
-
-
 # Sizes of the boat among what is known, as parts of its length.
 _SIZES = ("mass", "diameter", "propeller", "rudder_aspect")
 # Norms of what is without a dimension.
@@ -109,7 +101,7 @@ def _of_runs(evidence: Evidence) -> dict[str, tuple[float, float]]:
     body, runs = evidence.body, evidence.runs
     assert body is not None
     hull = runs[runs["part"].isin(HULL)]
-    found = {n: slope(hull[hull["test"] == test], angle, load, body) for test, angle, load, n in _SLOPES}
+    found = {n: slope(hull[hull["test"] == test], angle, load, body) for test, angle, load, n in SLOPES}
     return {n: (v, 0.0) for n, v in found.items() if math.isfinite(v)}
 
 
@@ -148,14 +140,13 @@ def coefficients_beside_each_other(evidence: Evidence, rule: Rule) -> Iterator[F
     known = _known(evidence)
     for row in proportions():
         name = next((n for n in row.names if n in known), "")
-        over = next((o for o in row.over if evaluated(o, known) is not None), "")
+        over, base = next(((o, e) for o in row.over if (e := evaluated(o, known)) is not None), ("", (1.0, 0.0)))
         if not name or (row.over and not over) or (row.sets and vehicle.term_set not in row.sets):
             continue
         place = printed_place(evidence.runs, [name])
         place = (evidence.body.file, []) if name in _SIZES else place
         if row.printed and not place[1]:
             continue
-        base = (evaluated(over, known) if over else None) or (1.0, 0.0)
         # What is published is meant as it stands: its error excuses no sign and no unit.
         severity = beyond(row, known[name], base, rule.limits | ({"errors": 0.0} if place[1] else {}))
         if not severity:

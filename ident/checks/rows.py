@@ -62,9 +62,5 @@ def _in_order(values: np.ndarray, strictly: bool) -> bool:
     """Whether numbers rise throughout, or fall; those that are not all the same."""
     if not np.isfinite(values).all() or float(np.ptp(values)) == 0.0:
         return False
-    steps = np.diff(values)
-    return (
-        bool((steps > 0.0).all() or (steps < 0.0).all())
-        if strictly
-        else bool((steps >= 0.0).all() or (steps <= 0.0).all())
-    )
+    ways = set(np.sign(np.diff(values)).tolist())
+    return len(ways if strictly else ways - {0.0}) == 1

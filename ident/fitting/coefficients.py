@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sim.files.columns import places_of
+
 if TYPE_CHECKING:
     import pandas as pd
 
@@ -40,17 +42,12 @@ class CoefficientSummary:
 
 def coefficient_summaries(rows: pd.DataFrame) -> list[CoefficientSummary]:
     """One entry a coefficient of database rows, in their order."""
-    # By arrays: taking a group of a table costs more than all that is asked of it.
     of_runs = rows["origin"].isin(["measured", "published"]).to_numpy(dtype=bool)
     estimated = rows["estimated_by"].ne("").to_numpy(dtype=bool)
     value, stderr, worst = (rows[c].to_numpy(dtype=float) for c in ("value", "stderr", "worst_residual"))
     runs, quality = rows["runs"].to_numpy(object), rows["quality"].to_numpy(object)
-    places: dict[str, list[int]] = {}
-    for place, name in enumerate(rows["coefficient"].tolist()):
-        places.setdefault(name, []).append(place)
     summaries = []
-    for name, found in places.items():
-        group = np.array(found)
+    for name, group in places_of(rows["coefficient"].tolist()).items():
         counted = group[of_runs[group]] if of_runs[group].any() else group
         counted = counted[value[counted] != 0.0]
         relative = stderr[counted] / np.abs(value[counted])

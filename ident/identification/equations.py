@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from ident.captive.run_table import MEASURED, STATES, sigma
+from sim.files.columns import records
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -151,10 +152,7 @@ class Runs:
         """The first run of each of some states, as number of the state and column -> value."""
         for at in range(0, len(states), _CHUNK):
             chunk = states[at : at + _CHUNK]
-            table = self.table.iloc[self.first[chunk]]
-            columns = {str(name): table[name].tolist() for name in table}
-            rows = (dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True))
-            yield from zip(chunk.tolist(), rows, strict=True)
+            yield from zip(chunk.tolist(), records(self.table.iloc[self.first[chunk]]), strict=True)
 
     def origins(self) -> Indices:
         """(runs,) number of the run that each is a copy of, or its own."""

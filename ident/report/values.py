@@ -15,6 +15,7 @@ from ident.report.figures import Picture, equations
 from sim.boat import catalogue
 from sim.boat.catalogue import Term
 from sim.boat.database import Version, axis_columns
+from sim.files.columns import records
 
 # Half width of the interval of a normal distribution that holds 95 %, in standard errors.
 _HALF_95 = NormalDist().inv_cdf(0.975)
@@ -172,9 +173,7 @@ def _method(row: Any) -> str:
 
 def _values(term: Term, rows: pd.DataFrame, runs: dict[str, Run]) -> Iterable[Value]:
     columns = [catalogue.axes()[a].column for a in term.axes]
-    names = dict.fromkeys([*columns, *_SHOWN])
-    cells = zip(*(rows[name].tolist() for name in names), strict=True)
-    for place, row in zip(rows.index, (dict(zip(names, one, strict=True)) for one in cells), strict=True):
+    for place, row in zip(rows.index, records(rows, [*columns, *_SHOWN]), strict=True):
         half = _HALF_95 * row["stderr"]
         yield Value(
             part=row["part"],

@@ -15,6 +15,7 @@ from sim.boat.database import axis_columns, from_column
 from sim.boat.parts import parts_of, vehicle_terms
 from sim.boat.tables import Table
 from sim.boat.vehicle import Vehicle
+from sim.files.columns import places_of
 from sim.files.errors import InputError
 
 if TYPE_CHECKING:
@@ -36,14 +37,6 @@ class Coefficient:
     def at(self, x: list[float]) -> float:
         """Value at a state, axis values in radians or SI."""
         return float(self.table.weights(x) @ self.values)
-
-
-def _grouped(rows: pd.DataFrame) -> dict[tuple[str, str], NDArray[np.int64]]:
-    """(symbol, part) -> places of its rows, as they come."""
-    places: dict[tuple[str, str], list[int]] = {}
-    for place, key in enumerate(zip(rows["coefficient"].tolist(), rows["part"].tolist(), strict=True)):
-        places.setdefault(key, []).append(place)
-    return {key: np.array(found, dtype=np.int64) for key, found in places.items()}
 
 
 class Coefficients:
@@ -70,10 +63,10 @@ class Coefficients:
         columns = {axis: column for column, axis in axis_columns().items()}
         known, parts = {t.name: t for t in vehicle_terms(vehicle)}, vehicle.part_names()
         self._all: dict[tuple[str, str], Coefficient] = {}
-        # By arrays: a group of a table is some dozens of times slower to take than places of an array.
         values = rows["value"].to_numpy(dtype=float)
         at: dict[str, Array] = {}
-        for (name, part), group in _grouped(rows).items():
+        symbols = zip(rows["coefficient"].tolist(), rows["part"].tolist(), strict=True)
+        for (name, part), group in places_of(symbols).items():
             if name not in known:
                 raise InputError(
                     f"vehicle {vehicle.name}", f"coefficient {name!r} is not a term of its set", _SAME_BOAT

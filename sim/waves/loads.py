@@ -304,28 +304,26 @@ def _turn(sums: Array, last: int, m: Array, y: Array) -> None:
 
 
 @inner
-def _add_up(sea: Sea, first: int, last: int, sums: Array, value: Array, slope: Array, at: int) -> None:
-    """Vectors of points by their weights and their moments about the origin, and the rates of both."""
+def _add_up(sea: Sea, first: int, last: int, sums: Array, column: int, out: Array, at: int) -> None:
+    """Vectors of points, or their rates, by weights, and their moments about the origin.
+
+    Parameters
+    ----------
+    column : Of ``sums`` where the vectors begin: 0, or 3 for the rates.
+    """
     points, weights = sea.points, sea.weights
-    f0 = f1 = f2 = f3 = f4 = f5 = d0 = d1 = d2 = d3 = d4 = d5 = 0.0
+    f0 = f1 = f2 = f3 = f4 = f5 = 0.0
     for i in range(first, last):
         x, y, z = points[i, 0], points[i, 1], points[i, 2]
-        a, b, c = weights[i, 0] * sums[i, 0], weights[i, 1] * sums[i, 1], weights[i, 2] * sums[i, 2]
+        a, b = weights[i, 0] * sums[i, column], weights[i, 1] * sums[i, column + 1]
+        c = weights[i, 2] * sums[i, column + 2]
         f0 += a
         f1 += b
         f2 += c
         f3 += y * c - z * b
         f4 += z * a - x * c
         f5 += x * b - y * a
-        a, b, c = weights[i, 0] * sums[i, 3], weights[i, 1] * sums[i, 4], weights[i, 2] * sums[i, 5]
-        d0 += a
-        d1 += b
-        d2 += c
-        d3 += y * c - z * b
-        d4 += z * a - x * c
-        d5 += x * b - y * a
-    value[at], value[at + 1], value[at + 2], value[at + 3], value[at + 4], value[at + 5] = f0, f1, f2, f3, f4, f5
-    slope[at], slope[at + 1], slope[at + 2], slope[at + 3], slope[at + 4], slope[at + 5] = d0, d1, d2, d3, d4, d5
+    out[at], out[at + 1], out[at + 2], out[at + 3], out[at + 4], out[at + 5] = f0, f1, f2, f3, f4, f5
 
 
 @merged
@@ -345,8 +343,11 @@ def sum_up(sea: Sea, y: Array, time: float, pas: Passage, value: Array, slope: A
     _turn(pas.sums, gauge, pas.matrix, y)
     for i in range(value.size):
         value[i] = slope[i] = 0.0
-    _add_up(sea, 0, n, pas.sums, value, slope, FORCE)
-    _add_up(sea, n, felt, pas.sums, value, slope, IMPULSE)
+    start = 0
+    for end, at in ((n, FORCE), (felt, IMPULSE)):
+        _add_up(sea, start, end, pas.sums, 0, value, at)
+        _add_up(sea, start, end, pas.sums, 3, slope, at)
+        start = end
     for i in range(felt, gauge):
         at = PROBES + 3 * (i - felt)
         for k in range(3):

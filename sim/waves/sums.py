@@ -13,7 +13,7 @@ import numpy as np
 from numpy.polynomial import Chebyshev, Polynomial
 from numpy.typing import NDArray
 
-from sim.compiled import fast, inlined
+from sim.compiled import fast, inlined, merged
 from sim.waves.linear import Waves
 
 Array = NDArray[np.float64]
@@ -55,6 +55,17 @@ def _series(c: tuple[float, ...], x: float) -> float:
     return c[0] + x * (c[1] + x * (c[2] + x * (c[3] + x * (c[4] + x * (c[5] + x * (c[6] + x * tail))))))
 
 
+@merged
+def _decay(t: np.float32) -> np.float32:
+    """exp(16 t) of t <= 0 in single precision."""
+    t = max(t, _NOTHING)
+    e = _ONE + t * (_ONE + t * (_E2 + t * (_E3 + t * (_E4 + t * _E5))))
+    e *= e
+    e *= e
+    e *= e
+    return e * e
+
+
 @fast(_FAST)
 def fill_many(
     w: Waves, north: float, east: float, time: float, top: float, angle: Array, sizes: Single, phases: Single
@@ -75,12 +86,7 @@ def fill_many(
         phases[0, j] = phases[2, j] = phases[1, j] - _QUARTER
     z = np.float32(top) * _SIXTEENTH
     for j in range(w.number.size):
-        t = max(-np.float32(w.number[j]) * z, _NOTHING)
-        e = _ONE + t * (_ONE + t * (_E2 + t * (_E3 + t * (_E4 + t * _E5))))
-        e *= e
-        e *= e
-        e *= e
-        sizes[1, j] = e * e * np.float32(w.amplitude[j] * w.frequency[j])
+        sizes[1, j] = _decay(-np.float32(w.number[j]) * z) * np.float32(w.amplitude[j] * w.frequency[j])
     for j in range(w.number.size):
         sizes[0, j] = sizes[1, j] * np.float32(w.frequency[j])
     for j in range(w.number.size):
@@ -121,12 +127,7 @@ def sum_many(
             q = r * r
             s = r * (_S0 + q * (_S1 + q * (_S2 + q * (_S3 + q * _S4))))
             c = _C0 + q * (_C1 + q * (_C2 + q * (_C3 + q * _C4)))
-            t = max(-k[j] * z, _NOTHING)
-            e = _ONE + t * (_ONE + t * (_E2 + t * (_E3 + t * (_E4 + t * _E5))))
-            e *= e
-            e *= e
-            e *= e
-            e = e * e * size[j]
+            e = _decay(-k[j] * z) * size[j]
             twice = (e + e) * s
             s, c = twice * c, e - twice * s
             rate, decay = w[j] - kn[j] * vx - ke[j] * vy, k[j] * vz

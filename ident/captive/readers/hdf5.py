@@ -117,10 +117,11 @@ def open_netcdf(path: Path, source: Source) -> Sheet:
 
     try:
         with netcdf_file(str(path), "r", mmap=False) as opened:
+            read = [(str(k), np.array(v[...]), v._attributes) for k, v in opened.variables.items()]
             vectors = {
-                str(k): (unpacked(np.atleast_1d(np.array(v[...])), v._attributes), unit(_text(getattr(v, "units", ""))))
-                for k, v in opened.variables.items()
-                if np.array(v[...]).ndim <= 1 and np.array(v[...]).dtype.kind in "iuf" and np.array(v[...]).size
+                name: (unpacked(np.atleast_1d(values), attributes), unit(_text(attributes.get("units", ""))))
+                for name, values, attributes in read
+                if values.ndim <= 1 and values.dtype.kind in "iuf" and values.size
             }
     except (OSError, ValueError, TypeError, IndexError, KeyError) as error:
         raise InputError(str(path), f"not a netCDF file: {str(error)[:100]}", "a whole file") from error
