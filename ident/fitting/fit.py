@@ -144,7 +144,10 @@ def _options(header: CampaignFile) -> dict[str, Any]:
     stated: dict[str, Any] = {"uncertainty": header.uncertainty.model_dump()}
     if header.pure_yaw is not None:
         stated["pure_yaw"] = header.pure_yaw.model_dump()
-    return stated | {f"shared_error {one.name}": one.model_dump(exclude={"name"}) for one in header.shared_error}
+    return stated | {
+        f"shared_error {one.name}": one.model_dump(exclude={"name"}, exclude_defaults=True)
+        for one in header.shared_error
+    }
 
 
 def metadata(
