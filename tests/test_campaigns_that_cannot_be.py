@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import shutil
 
+import numpy as np
 import pandas as pd
 import pytest
 from click.testing import CliRunner
-from made_ship import ROOT
+from made_campaigns import campaign
+from made_ship import ROOT, ship
 from small_campaign import RUNS, write
 
 from ident.captive.campaign import read_campaign
@@ -105,3 +107,43 @@ def test_a_table_that_no_source_names_is_said(folder):
     (only,) = findings(folder, "unread")
     assert only.severity == "warning"
     assert "more/DRIFT2.CSV" in only.what
+
+
+def test_a_ship_has_no_load_of_incidence(tmp_path):
+    """A vehicle of the horizontal plane: what is said of alpha would change the speed along it, and nothing else."""
+    folder = ship(tmp_path / "ship")
+    assert not findings(folder, "state")
+    stated = folder / "campaign.toml"
+    text = stated.read_text()
+    assert 'alpha = "0 deg"' in text
+    stated.write_text(text.replace('alpha = "0 deg"', 'alpha = "5 deg"'))
+    found = findings(folder, "state")
+    assert [(f.severity, f.columns) for f in found] == [("error", ("alpha",))]
+
+
+def scatterless(tmp_path, drag):
+    """Two histories in drift whose axial force is what it is, sample after sample."""
+    rng = np.random.default_rng(3)
+    time = np.arange(0.0, 20.0, 0.05)
+    folder = tmp_path / "campaign"
+    folder.mkdir()
+    for beta, x in zip((4, 8), drag, strict=True):
+        y = -30.0 * beta + rng.normal(0.0, 1.0, len(time))
+        axial = np.full(len(time), -31.0) if x == 0.0 else -31.0 + rng.normal(0.0, x, len(time))
+        lines = "\n".join(f"{t:.2f},{a:.9g},{b:.9g}" for t, a, b in zip(time, axial, y, strict=True))
+        (folder / f"drift_{beta}.csv").write_text("time [s],X [N],Y [N]\n" + lines + "\n")
+    source = '[[source]]\nfiles = "drift_*.csv"\nrows = "history"\nmatch = \'drift_(?P<beta_deg>[0-9]+)\'\n'
+    source += '[source.constants]\ntest = "drift_horizontal"\npart = "hull"\nquality = "ok"\nU = "2 m/s"\n'
+    source += 'alpha = "0 deg"\nD0 = "25 m"\n[source.reduction]\nkind = "steady"\n'
+    campaign(folder, source)
+    return [f for f in findings(folder, "errors") if "standard error of zero" in f.what]
+
+
+def test_a_computed_load_without_scatter_is_said_where_it_outweighs_nothing(tmp_path):
+    (only,) = scatterless(tmp_path, (0.0, 0.0))
+    assert (only.severity, only.columns) == ("warning", ("X",))
+
+
+def test_a_load_without_scatter_that_outweighs_a_measured_one_is_an_error(tmp_path):
+    (only,) = scatterless(tmp_path, (0.0, 1.0))
+    assert (only.severity, only.columns) == ("error", ("X",))

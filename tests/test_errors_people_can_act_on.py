@@ -246,3 +246,11 @@ def test_moment_that_cannot_be_moved_for_want_of_a_force_is_named(tmp_path):
 def test_runs_that_identify_nothing_are_refused(tmp_path):
     text = RUNS.replace("book,,", "book,,X Y")
     assert_refused(write(tmp_path, runs=text), "small", "identify nothing")
+
+
+def test_a_single_angle_is_told_what_it_cannot_tell_apart(tmp_path):
+    """Two unknowns of one load, one run: each is named, and what is missing."""
+    header = HEADER.replace('vehicle = "bb2"', 'vehicle = "suboff"')
+    assert header != HEADER
+    words = ("1 run cannot tell", "Y_v Y_v|v|", "further angles")
+    assert_refused(write(tmp_path, header, "\n".join(RUNS.splitlines()[:3:2]) + "\n"), *words)

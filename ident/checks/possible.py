@@ -15,6 +15,7 @@ from ident.captive.campaign import Campaign
 from ident.captive.run_table import MEASURED
 from ident.checks.findings import Evidence, Finding, Rule, check, kept, rows_of, together
 from sim.boat.catalogue import ACCELERATIONS, SETS, terms
+from sim.boat.parts import vehicle_terms
 
 # Files that hold runs when a campaign's source names them.
 _TABLES = frozenset((".csv", ".parquet", ".xlsx", ".xls", ".xlsb", ".ods", ".mat", ".h5", ".nc", ".tdms", ".lvm"))
@@ -63,6 +64,19 @@ def _beyond(runs: pd.DataFrame, rule: Rule, name: str, size: pd.Series, most: fl
         worst = int(sizes.argmax())
         what = f"{name} of run {group['run_id'].iloc[worst]} is {sizes[worst]:.4g} {unit}, beyond {most:g}"
         yield rule.finding(str(file), rows_of(group), [name], f"{what}; {len(group)} of the runs")
+
+
+@check("state")
+def motions_without_a_load(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
+    """Incidence or pitching of a vehicle that moves in the horizontal plane alone: no term has a load of it."""
+    runs, vehicle = evidence.runs, evidence.vehicle
+    if vehicle is None or {"Z", "M"} & {term.output for term in vehicle_terms(vehicle)}:
+        return
+    for name in ("alpha", "q"):
+        moved = runs[runs[name].fillna(0.0) != 0.0]
+        for file, group in moved.groupby(together(moved), sort=False):
+            what = f"{name} of run {group['run_id'].iloc[0]} is not zero, and {vehicle.name} has no term in Z or M; "
+            yield rule.finding(str(file), rows_of(group), [name], f"{what}{len(group)} of the runs")
 
 
 @check("state")
@@ -116,7 +130,11 @@ def errors_that_leave_nothing(evidence: Evidence, rule: Rule) -> Iterator[Findin
 
 @check("errors")
 def loads_without_error(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
-    """Loads with a standard error of zero are known exactly: all others would count for nothing beside them."""
+    """Loads with a standard error of zero are known exactly: all others would count for nothing beside them.
+
+    A history without scatter, as a computation leaves that has settled, is said; it takes nothing from others that are
+    as certain.
+    """
     runs = evidence.runs
     for file, group in runs.groupby(together(runs), sort=False):
         exact = {o: kept(group, o) & (group[o] != 0.0) & (group[f"s_{o}"] == 0.0) for o in MEASURED if o in group}
@@ -124,7 +142,15 @@ def loads_without_error(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
         if columns:
             bad = group[pd.DataFrame(exact).any(axis=1)]
             what = f"{' '.join(columns)} of run {bad['run_id'].iloc[0]} with a standard error of zero; {len(bad)} runs"
-            yield rule.finding(str(file), rows_of(bad), columns, what)
+            scatterless = bool((bad["reduction"] != "").all()) if "reduction" in bad else False
+            mild = scatterless and not any(_outweighed(runs, bad, o, rule.limits["exact"]) for o in columns)
+            yield rule.finding(str(file), rows_of(bad), columns, what, "warning" if mild else "")
+
+
+def _outweighed(runs: pd.DataFrame, exact: pd.DataFrame, load: str, most: float) -> bool:
+    """Whether runs of the same tests have errors of a load that would count for nothing beside exact ones."""
+    others = runs[runs["test"].isin(exact["test"]) & kept(runs, load) & (runs[load] != 0.0) & (runs[f"s_{load}"] > 0.0)]
+    return bool((others[f"s_{load}"] > most * others[load].abs()).any())
 
 
 @check("errors")

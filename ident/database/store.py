@@ -20,6 +20,7 @@ from ident.database.leftovers import check_foreign, remove_unfinished
 from ident.database.lock import WAIT, held
 from ident.identification.identify import Identification
 from ident.identification.nodes import Node
+from ident.identification.noted import UNTOLD
 from ident.output import check_folder
 from sim.boat.database import (
     NUMBERS,
@@ -125,13 +126,22 @@ def database_rows(identified: Identification) -> pd.DataFrame:
     for row in rows:
         row |= {k: float(f"{row[k]:.12g}") for k in NUMBERS}
     if not rows:
-        name = identified.campaign.header.name
-        reasons = list(dict.fromkeys(one.reason for one in identified.unused))[:3]
-        why = f"; loads were left out: {'; '.join(reasons)}" if reasons else ""
-        raise InputError(name, f"the runs identify nothing{why}", "runs of at least one known test")
+        raise InputError(identified.campaign.header.name, *_why_nothing(identified))
     table = pd.DataFrame(rows).reindex(columns=column_order())
     _check_finite(table, identified.campaign.header.name)
     return table
+
+
+def _why_nothing(identified: Identification) -> tuple[str, str]:
+    """What is said, and what is allowed, of runs that identify no coefficient."""
+    untold = list(dict.fromkeys(one.subject for one in identified.warnings if one.message.endswith(UNTOLD)))
+    if untold:
+        many = len(identified.campaign.runs)
+        what = f"; {many} run{'' if many == 1 else 's'} cannot tell {' '.join(untold)} from one another"
+        return f"the runs identify nothing{what}", "runs of the same test at further angles, rates or speeds"
+    reasons = list(dict.fromkeys(one.reason for one in identified.unused))[:3]
+    why = f"; loads were left out: {'; '.join(reasons)}" if reasons else ""
+    return f"the runs identify nothing{why}", "runs of at least one known test"
 
 
 def _check_finite(rows: pd.DataFrame, where: str) -> None:

@@ -5,6 +5,9 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass
 from typing import Any
 
+# Said of a value that the runs do not determine by itself.
+UNTOLD = "the runs cannot tell it from other terms; dropped"
+
 
 @dataclass(frozen=True)
 class UnusedLoad:

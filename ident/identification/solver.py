@@ -18,7 +18,7 @@ from ident.cluster import Spread, here
 from ident.identification.equations import ALWAYS, BEYOND, NONZERO, Equations, Form, Note, Runs
 from ident.identification.facilities import Left
 from ident.identification.nodes import Node, by_coefficient, key_point, table_points
-from ident.identification.noted import FitWarning, UnusedLoad
+from ident.identification.noted import UNTOLD, FitWarning, UnusedLoad
 from ident.identification.stage_solve import Loads, solve_stage
 from sim.boat.catalogue import ACCELERATIONS, OUTPUTS, Term
 from sim.boat.forces import axis_values, boat_features, body_velocity, multiplier, plane_features
@@ -275,7 +275,7 @@ class Solver:
         solution = solve_stage(a, b, loads, self.values, self.covariance, spread=spread)
         for node in solution.lost:
             bad = self.nodes[first + node]
-            text = f"{bad.part} at {bad.point}: the runs cannot tell it from other terms; dropped"
+            text = f"{bad.part} at {bad.point}: {UNTOLD}"
             self.warnings.append(FitWarning(bad.name, text))
         self.covariance = np.block([[self.covariance, solution.cross.T], [solution.cross, solution.covariance]])
         self.values = np.concatenate([self.values, solution.values])
