@@ -28,6 +28,7 @@ from ident.checks import copies as checks_copies
 from ident.checks import fitted as checks_fitted
 from ident.checks import geometry as checks_geometry
 from ident.checks import histories as checks_histories
+from ident.checks import levels as checks_levels
 from ident.checks import lines as checks_lines
 from ident.checks import physics as checks_physics
 from ident.checks import planes as checks_planes
@@ -70,6 +71,7 @@ _MODULES = (
     checks_fitted,
     checks_histories,
     checks_geometry,
+    checks_levels,
     checks_lines,
     checks_physics,
     checks_planes,

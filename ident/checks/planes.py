@@ -1,12 +1,16 @@
-"""Checks of planes: which way a deflected plane lifts, and where its load acts."""
+"""Checks of planes and sail: which way a deflected plane lifts, and where the loads act."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 
 import numpy as np
 
-from ident.checks.findings import Evidence, Finding, Rule, check, kept, printed_place, rows_of, together
+from ident.checks.findings import HULL, Evidence, Finding, Rule, check, kept, printed_place, rows_of, together
+from ident.checks.physics import slope
+from ident.checks.potential import hull_constants
+from ident.checks.resistance import spheroid_diameter
 from sim.boat.parts import vehicle_terms
 from sim.boat.vehicle import Vehicle
 
@@ -76,3 +80,31 @@ def planes_of_runs(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
                     f"the force of {plane.name} over its angle goes against the axis that a deflected plane lifts along"
                 )
                 yield rule.finding(str(file), rows_of(group), ["plane"], what)
+
+
+@check("levers")
+def side_force_of_the_sail(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
+    """K over Y in drift of a boat with a sail: K = -z Y, and the side force acts between the axis and the sail top."""
+    body, vehicle, runs = evidence.body, evidence.vehicle, evidence.runs
+    if body is None or body.mass is None or vehicle is None or vehicle.particulars.sail_top is None:
+        return
+    top = float(vehicle.particulars.sail_top.value[2]) - float(vehicle.particulars.centre_of_buoyancy.value[2])
+    if not -top > rule.limits["sail"] * 0.5 * spheroid_diameter(body):
+        return
+    of_test = runs[(runs["test"] == "drift_horizontal") & runs["part"].isin(HULL)]
+    pairs = [
+        (str(file), rows_of(group), slope(group, "beta", "K", body), slope(group, "beta", "Y", body))
+        for file, group in of_test.groupby(together(of_test), sort=False)
+    ]
+    if of_test.empty and evidence.constants is not None:
+        known = hull_constants(evidence)
+        for roll, side in (("K_v", "Y_v"), ("K_uv", "Y_uv")):
+            if roll in known and side in known:
+                pairs.append((*printed_place(runs, [roll]), known[roll][0], known[side][0]))
+    for file, rows, turn, push in pairs:
+        height = -turn / push * body.length if push and math.isfinite(turn) else 0.0
+        if not height > -rule.limits["share"] * top:
+            continue
+        what = f"K over Y in drift is that of a side force {height:.3g} m below the axis, and the sail is above it "
+        what += f"(its top by {-top:.3g} m): the sign of K, or the height of [moment_point]?"
+        yield rule.finding(file, rows, ["K", "Y"], what)

@@ -13,7 +13,7 @@ import pandas as pd
 
 from ident.captive.campaign import Campaign
 from ident.captive.run_table import MEASURED
-from ident.checks.findings import Evidence, Finding, Rule, check, kept, rows_of, together
+from ident.checks.findings import Evidence, Finding, Rule, check, factors, kept, rows_of, together
 from sim.boat.catalogue import ACCELERATIONS, SETS, terms
 from sim.boat.parts import vehicle_terms
 
@@ -167,6 +167,23 @@ def runs_that_decide_alone(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
             )
             what += "the others count for nothing beside it"
             yield rule.finding(str(file), rows_of(small), ["rel_sigma"], what, "warning")
+
+
+@check("errors")
+def words_that_leave_nothing(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
+    """Relative errors times the factor of the quality word beyond half of the load: twice that, and no sign is left."""
+    runs = evidence.runs
+    published = runs["coefficient"].fillna("").ne("") if "coefficient" in runs else pd.Series(False, runs.index)
+    trusted = factors(evidence, runs) * runs["rel_sigma"]
+    # Above the whole load rel_sigma is an error by itself.
+    large = runs[~published & (trusted > rule.limits["half"]) & (runs["rel_sigma"] <= rule.limits["run"])]
+    for (file, word), group in large.groupby([together(large), large["quality"].fillna("")], sort=False):
+        size = trusted[group.index].to_numpy(float)
+        worst = group.iloc[int(size.argmax())]
+        what = f"the standard error of run {worst['run_id']} is {100.0 * size.max():.3g} % of its loads "
+        what += f"(rel_sigma = {worst['rel_sigma']:.4g} times the factor of quality {str(word)!r}): twice that is more "
+        what += f"than the load; {len(group)} runs, which hardly count"
+        yield rule.finding(str(file), rows_of(group), ["rel_sigma", "quality"], what, "warning")
 
 
 @check("zero")

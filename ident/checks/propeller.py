@@ -54,6 +54,49 @@ def energy_of_the_wake(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
 
 
 @check("open_water")
+def energy_at_rest(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
+    """The power that the thrust without advance takes at the least, T sqrt(T / (2 rho A)), over that of the torque.
+
+    In coefficients K_T^1.5 / (pi sqrt(2 pi) K_Q): what stands in one column by another factor is seen here, where both
+    are largest.
+    """
+    runs, limits = evidence.runs, rule.limits
+    held = runs[(runs["test"] == "open_water") & (runs["J"] == 0.0) & (runs["KT"] > 0.0) & (runs["KQ"] > 0.0)]
+    held = held[kept(held, "KT") & kept(held, "KQ")]
+    for file, group in held.groupby("file", sort=False):
+        merit = float((group["KT"] ** 1.5 / group["KQ"]).median()) / (math.pi * math.sqrt(2.0 * math.pi))
+        if limits["rest_low"] <= merit <= limits["rest_high"]:
+            continue
+        first = group.iloc[0]
+        what = f"KT = {first['KT']:.4g} with KQ = {first['KQ']:.4g} at J = 0: an actuator disk would need {merit:.2g} "
+        what += f"of that power, propellers have {limits['rest_low']:g} to {limits['rest_high']:g}: "
+        what += "a factor in KT or KQ?"
+        # A duct may thrust as much as the propeller in it.
+        impossible = merit * math.sqrt(limits["ducted"]) > 1.0
+        yield rule.finding(str(file), rows_of(group), ["KT", "KQ"], what, "" if impossible else "warning")
+
+
+@check("open_water")
+def propulsion_beyond_the_curve(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
+    """The advance at the propulsion point, (1 - w_T) U / (n D), at an end of the curve: its own J lies beyond."""
+    runs, vehicle, table = evidence.runs, evidence.vehicle, evidence.constants
+    if vehicle is None or vehicle.propeller is None or table is None:
+        return
+    wake = table.loc[table["coefficient"] == "w_T", "value"]
+    points = runs[(runs["test"] == "self_propulsion") & (runs["n"].fillna(0.0) != 0.0)]
+    curve = runs[(runs["test"] == "open_water") & runs["J"].notna() & kept(runs, "KT")]
+    if wake.empty or points.empty or curve["J"].nunique() < 3:
+        return
+    point = points.iloc[0]
+    advance = (1.0 - float(wake.iloc[0])) * float(point["U"]) / (abs(float(point["n"])) * vehicle.diameter)
+    for end in (float(curve["J"].min()), float(curve["J"].max())):
+        if math.isclose(advance, end, rel_tol=1e-6, abs_tol=1e-9):
+            what = f"the thrust of run {point['run_id']} is beyond the open-water curve, which ends at J = {end:g}: "
+            what += "the wake fraction is that of the end; rows that are missing, n, or a resistance of another size?"
+            yield rule.finding(str(point["file"]), rows_of(points.iloc[:1]), ["n"], what, "warning")
+
+
+@check("open_water")
 def one_advance_below_zero(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
     """A single J below zero in a curve of positive ones: nobody measures one point astern."""
     tested = evidence.runs[evidence.runs["test"] == "open_water"]
@@ -125,6 +168,30 @@ def force_over_the_angle(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
             what += f"at the stern, propellers have {rule.limits['low']:g} to {rule.limits['high']:g}: the unit of "
             what += f"{rate}, {angle} or {force}?"
             yield rule.finding(str(file), rows_of(group), [force, rate], what, "error" if far else "")
+
+
+@check("side_force")
+def acts_at_the_propeller(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
+    """Moment of the propeller's side load over the load: N = x Y and M = -x Z of where the propeller is."""
+    body, vehicle, runs = evidence.body, evidence.vehicle, evidence.runs
+    if body is None or vehicle is None or vehicle.propeller is None:
+        return
+    place = vehicle.propeller.position
+    # Behind the hull, where nothing says.
+    stern = vehicle.particulars.centre_of_buoyancy.value[0] - 0.5 * body.length
+    x = (place.value[0] if place is not None else stern) / body.length
+    side = runs[runs["test"] == "propeller_side_force"]
+    for force, moment, sense in (("Y", "N", 1.0), ("Z", "M", -1.0)):
+        given = side[kept(side, force) & kept(side, moment) & (side[force] != 0.0) & (side[moment] != 0.0)]
+        lever = sense * given[moment] / given[force] / body.length
+        for file, group in given.groupby(together(given), sort=False):
+            at = float(lever[group.index].median())
+            if abs(at - x) <= rule.limits["lever"]:
+                continue
+            what = f"{moment} over {force} of the propeller is that of a load at x = {at:.2g} L, and it is at "
+            what += f"{x:.2g} L: the sign or unit of {moment} or {force}, or [moment_point]?"
+            far = abs(at - x) > rule.limits["ahead"]
+            yield rule.finding(str(file), rows_of(group), [moment, force], what, "error" if far else "")
 
 
 @check("essential")

@@ -88,6 +88,48 @@ def added_mass_over_the_spheroid(evidence: Evidence, rule: Rule) -> Iterator[Fin
         yield rule.finding(file, rows_of(group), [output, acceleration], what)
 
 
+# Added masses across, and about the lateral axes.
+_ACROSS = (("Y_vdot", "Z_wdot", "mean_mass"), ("N_rdot", "M_qdot", "mean_inertia"))
+
+
+@check("added_mass")
+def both_ways_together(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
+    """The geometric mean of the added masses sideways and up and down, over that of the spheroid.
+
+    Of an ellipse of half axes a and b they are pi b^2 and pi a^2: their mean is the ellipse's own area however flat it
+    is, and of any other section of that area it is not much less. What a boat's shape leaves open of one is
+    not open of both.
+    """
+    body = evidence.body
+    if body is None or body.mass is None or evidence.constants is None or evidence.vehicle is None:
+        return
+    diameter = spheroid_diameter(body)
+    if diameter >= body.length:
+        return
+    _, across, turned = spheroid(body.length, diameter)
+    unit = 0.5 * body.density * body.length**3
+    of_spheroid = {"mean_mass": across * body.mass / unit}
+    of_spheroid["mean_inertia"] = turned * body.mass * (1.0 + (diameter / body.length) ** 2) / 20.0 / unit
+    known = hull_constants(evidence)
+    for side, up, limit in _ACROSS:
+        if not all(n in known and known[n][0] < 0.0 for n in (side, up)):
+            continue
+        (one, s_one), (two, s_two) = known[side], known[up]
+        mean = math.sqrt(one * two)
+        slack = 1.0 + 0.5 * rule.limits["errors"] * math.hypot(s_one / one, s_two / two)
+        place = printed_place(evidence.runs, [side, up])
+        share = mean / of_spheroid[limit]
+        # What is published is meant as it stands.
+        runs = evidence.runs
+        printed = "coefficient" in runs and {side, up} <= set(runs["coefficient"])
+        if share * (1.0 if printed else slack) >= rule.limits[limit]:
+            continue
+        what = f"{side} = {one:.3g} and {up} = {two:.3g}: their geometric mean is {share:.2g} of that of the spheroid "
+        what += f"of the boat's length and volume, boats have {rule.limits[limit]:g} at the least: their unit or norm, "
+        what += "or the unit of the acceleration?"
+        yield rule.finding(*place, [side, up], what)
+
+
 @check("draught")
 def draught_of_the_body(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
     """The draught that loads were made dimensionless with, beside the volume, and the lines where there are any."""

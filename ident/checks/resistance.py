@@ -102,3 +102,36 @@ def same_resistance(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
         what += f"{base[0]}: a factor {factor:.2g}; the unit of speed or X?"
         far = not 1.0 / rule.limits["factor"] < factor < rule.limits["factor"]
         yield rule.finding(file, rows_of(group), ["X", "U"], what, "error" if far else "")
+
+
+@check("between_tests")
+def same_resistance_at_one_speed(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
+    """X straight ahead at one speed and depth, from the towing test and from the drift tests of the same campaign.
+
+    One model in one facility has one resistance, to what a degree or two of drift adds: a zero not taken off is seen
+    long before it is half of X.
+    """
+    body = evidence.body
+    if body is None:
+        return
+    runs = straight_ahead(evidence.runs)
+    runs = runs.assign(place=runs["U"].round(6).astype(str) + "/" + runs["D0"].round(6).astype(str))
+    size = prime(runs, "X", body)
+    error = prime(runs.assign(X=runs["s_X"].fillna(0.0)), "X", body)
+    towed = runs["test"] == "towing"
+    at = size[towed].groupby(runs["place"][towed]).median()
+    known = error[towed].groupby(runs["place"][towed]).median()
+    for (file, test), group in runs[~towed & runs["place"].isin(at.index)].groupby(
+        [together(runs), runs["test"]], sort=False
+    ):
+        base = group["place"].map(at)
+        off = float((size[group.index] - base).median())
+        usual = float(base.abs().median())
+        spread = math.hypot(float(error[group.index].median()), float(group["place"].map(known).median()))
+        share = abs(off) / usual if usual > 0.0 else 0.0
+        # By more than half it is a finding already.
+        if share <= rule.limits["ahead"] or abs(off) <= rule.limits["errors"] * spread or share > rule.limits["share"]:
+            continue
+        what = f"X of {test} straight ahead is off that of towing at the same speed by {100.0 * off / usual:+.3g} % of "
+        what += "the resistance: a zero that was not taken off, or a thrust?"
+        yield rule.finding(str(file), rows_of(group), ["X"], what)

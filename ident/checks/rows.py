@@ -8,8 +8,11 @@ import numpy as np
 
 from ident.captive.published import TEST as PUBLISHED
 from ident.captive.run_table import STATES
-from ident.checks.findings import Evidence, Finding, Rule, check, rows_of, together
-from sim.boat.catalogue import OUTPUTS
+from ident.checks.findings import HULL, Evidence, Finding, Rule, check, kept, rows_of, together
+from sim.boat.catalogue import ACCELERATIONS, OUTPUTS
+
+# An angle or a rate below this is none.
+_NONE = 1e-6
 
 
 @check("rows")
@@ -64,3 +67,35 @@ def _in_order(values: np.ndarray, strictly: bool) -> bool:
         return False
     ways = set(np.sign(np.diff(values)).tolist())
     return len(ways if strictly else ways - {0.0}) == 1
+
+
+# Motion -> load that it makes, which grows with it.
+_MADE = {
+    **{"beta": "Y", "alpha": "Z", "r": "N", "q": "M", "p": "K"},
+    **dict(zip(ACCELERATIONS, OUTPUTS, strict=True)),
+}
+
+
+@check("rows")
+def loads_that_fall_as_their_motion_grows(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
+    """Loads of a motion in the order of its sizes: one that falls was sorted, or is of another place."""
+    runs = evidence.runs
+    hull = (runs["test"] != PUBLISHED) & runs["part"].isin(HULL)
+    needed = ["run_id", "test", "U", "file", "row", *(c for c in ("files", "exclude") if c in runs)]
+    tested = runs.loc[hull, [*needed, *_MADE, *OUTPUTS]]
+    moving = np.abs(np.nan_to_num(tested[list(_MADE)].to_numpy(float))) > _NONE
+    for k, (motion, load) in enumerate(_MADE.items()):
+        alone = tested[moving[:, k] & (moving.sum(axis=1) == 1)]
+        moved = alone[kept(alone, load)] if len(alone) >= rule.limits["falls"] else alone.iloc[:0]
+        for (file, _, speed), group in moved.groupby([together(moved), "test", moved["U"].round(6)], sort=False):
+            size = group[motion].abs().round(9)
+            odd = (group[load] * np.sign(group[motion])).groupby(size).mean()
+            if len(odd) < rule.limits["falls"] or (odd.abs() == 0.0).all():
+                continue
+            # Ranks, so that nothing is said of how it grows.
+            order = odd.abs().rank().to_numpy()
+            if float(np.corrcoef(order, np.arange(order.size))[0, 1]) >= 0.0:
+                continue
+            what = f"{load} falls from {odd.iloc[0]:.4g} to {odd.iloc[-1]:.4g} as {motion} grows over {len(odd)} sizes "
+            what += f"at {speed:.4g} m/s: was the column sorted by itself, or is it of another harmonic?"
+            yield rule.finding(str(file), rows_of(group), [load, motion], what)

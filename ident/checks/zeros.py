@@ -89,6 +89,36 @@ def _last(design: Array, values: Array, error: Array) -> tuple[float, float]:
 
 
 @check("zero_reading")
+def means_of_oscillations(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
+    """Y, K and N that the two sides of a sway, roll or yaw have in common: the mean, which symmetry leaves nothing."""
+    runs = evidence.runs[evidence.runs["part"].isin(HULL)]
+    phases = runs["run_id"].astype(str).str.extract(r"^(?P<cycle>.*)[+-]a$")["cycle"]
+    ends = runs[phases.notna() & (runs[["alpha", "beta"]].fillna(0.0).abs() < math.radians(0.1)).all(axis=1)]
+    ends = ends.assign(cycle=phases[ends.index])
+    ends = ends[(ends[["udot", "wdot", "qdot"]].fillna(0.0) == 0.0).all(axis=1)]
+    if ends.empty:
+        return
+    swung = runs[runs["run_id"].astype(str).str.contains(r"[+-][av]$")]
+    for file, group in ends.groupby(together(ends), sort=False):
+        for output in "YKN":
+            given = group[kept(group, output)]
+            sides = given.groupby("cycle")[output]
+            common = sides.mean()[sides.size() == 2].abs()
+            largest = float(swung.loc[together(swung) == file, output].abs().max())
+            if common.empty or not largest > 0.0 or float(common.max()) <= rule.limits["mean"] * largest:
+                continue
+            worst = str(common.idxmax())
+            error = float(given.loc[given["cycle"] == worst, f"s_{output}"].fillna(0.0).mean())
+            if float(common.max()) <= rule.limits["errors"] * error / math.sqrt(2.0):
+                continue
+            what = f"{output} of oscillation {worst} has {common.max():.4g} on both sides, "
+            what += f"{100.0 * common.max() / largest:.2g} % of the largest: a mean, or a second harmonic, that a "
+            what += "symmetric hull does not have"
+            rows = given.loc[given["cycle"] == worst, "row"].unique()
+            yield rule.finding(str(file), rows if given["file"].nunique() == 1 else [], [output], what)
+
+
+@check("zero_reading")
 def constant_beside_the_square_of_the_speed(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
     """X, Z and M straight ahead at several speeds: c U^2, X with the friction line, and a constant beside it."""
     body, campaign = evidence.body, evidence.campaign
