@@ -8,11 +8,15 @@ from made_campaigns import (
     COLUMNS,
     MEANS,
     SERIES,
+    STEADY,
     TIME,
     assert_means,
+    campaign,
+    history,
     reduced,
 )
 
+from ident.captive.campaign import read_campaign
 from sim.files.errors import InputError
 
 RECORD = np.column_stack([TIME, SERIES])
@@ -95,3 +99,68 @@ def test_tecplot_zones(tmp_path, packing):
     assert_means(reduced(tmp_path, "run.dat", 'table = "run"'))
     with pytest.raises(InputError, match="2 zones"):
         reduced(tmp_path, "run.dat")
+
+
+@pytest.mark.parametrize("clock", ["Cur_Time", "rate"])
+def test_an_unsteady_su2_history_in_tecplot_form_is_its_last_iterations(tmp_path, clock):
+    lines = ['TITLE = "SU2"', 'VARIABLES = "Time_Iter","Outer_Iter","Inner_Iter","Cur_Time","CFx","CFy","CMz"', "ZONE"]
+    for step, (t, *row) in enumerate(RECORD.tolist()):
+        lines += [", ".join(map(repr, [step, 0, k, t, *(v + 9.0 - 3 * k for v in row)])) for k in range(4)]
+    (tmp_path / "history.dat").write_text("\n".join(lines), "utf-8")
+    names = NAMED.format("Cur_Time", "CFx", "CFy", "CMz")
+    ignored = ["Time_Iter", "Outer_Iter", "Inner_Iter"]
+    if clock == "rate":
+        names = names.replace('"Cur_Time" = "time [s]"\n', "") + "[source.reduction]\nrate_hz = 20.0\n"
+        ignored.append("Cur_Time")
+    keys = f"ignore = {ignored!r}\n".replace("'", '"') + names
+    source = history("history.dat", keys, reduction="" if clock == "rate" else STEADY)
+    campaign(tmp_path, source.replace("rate_hz", 'kind = "steady"\nrate_hz'))
+    assert_means(read_campaign(tmp_path).runs)
+
+
+def test_tecplot_repeats_notes_and_variables_of_other_zones(tmp_path):
+    head = [
+        'VARIABLES = "time [s]" "X [N]" "Y [N]" "N [N m]"',
+        'ZONE T="run", I=400, DATAPACKING=BLOCK',
+        'AUXDATA a="1"',
+    ]
+    block = [" ".join(map(repr, column)) for column in RECORD.T[:3].tolist()] + ["400*-7.5"]
+    other = ['ZONE T="shares", VARSHARELIST=([1]=1)', *(" ".join(map(repr, row)) for row in RECORD[:, 1:].tolist())]
+    (tmp_path / "run.dat").write_text("\n".join([*head, *block, *other]), "utf-8")
+    run = reduced(tmp_path, "run.dat", 'table = "run"').iloc[0]
+    np.testing.assert_allclose(run[COLUMNS].astype(float), [*MEANS[:2], -7.5], rtol=1e-6)
+    with pytest.raises(InputError, match="zone 'shares' leaves variables out"):
+        reduced(tmp_path, "run.dat", 'table = "shares"')
+
+
+def test_xy_plots_of_fluent_are_joined_where_all_curves_have_a_value(tmp_path):
+    lines = ['(title "Convergence history")', '(labels "Iteration" "force")', ""]
+    for name, column in zip(("fx", "fy", "mz"), SERIES.T.tolist(), strict=True):
+        lines += [f'((xy/key/label "{name}")', *(f"{i}\t{v!r}" for i, v in enumerate(column)), ")", ""]
+    (tmp_path / "run.xy").write_text("\n".join(lines), "utf-8")
+    assert_means(reduced(tmp_path, "run.xy", NAMED.format("Iteration", "fx", "fy", "mz")))
+    (tmp_path / "run.xy").write_text("\n".join(lines).replace("\t", "\tx", 1), "utf-8")
+    with pytest.raises(InputError, match=r"row 5: '0\\tx"):
+        reduced(tmp_path, "run.xy", NAMED.format("Iteration", "fx", "fy", "mz"))
+
+
+@pytest.mark.parametrize("skip", ["", 'skip = "^ *-+ "\n'])
+def test_names_of_two_words_above_a_line_of_dashes(tmp_path, skip):
+    """The polar that XFLR5 exports."""
+    head = "   time     Fx        Fy    Top Xtr Bot Xtr   Mz  \n ------- -------- --------- ------- ------- -------"
+    rows = ["  ".join(map(repr, [t, x, y, 0.5, 0.5, n])) for t, x, y, n in RECORD.tolist()]
+    (tmp_path / "run.txt").write_text("xflr5 v6.59\n\n" + "\n".join([head, *rows]), "utf-8")
+    keys = f'header_pattern = "^ *time +Fx"\n{skip}ignore = ["Top Xtr", "Bot Xtr"]\n'
+    assert_means(reduced(tmp_path, "run.txt", keys + NAMED.format("time", "Fx", "Fy", "Mz")))
+
+
+def test_force_coefficients_of_openfoam_by_their_area(tmp_path):
+    lines = ["# Force coefficients", "# Aref : 1", "#", "# Time \tCd \tCs \tCmYaw"]
+    lines += ["\t".join(map(repr, row)) for row in RECORD.tolist()]
+    (tmp_path / "coefficient.dat").write_text("\n".join(lines), "utf-8")
+    declared = NAMED.format("Time", "Cd", "Cs", "CmYaw").replace("[N m]", "[-]").replace("[N]", "[-]")
+    area = '[source.reference]\narea_m2 = 0.0005\nlength_m = 1.0\nsource = "Aref, lRef"\n'
+    keys = 'header_pattern = "# Time"\nnormalisation = "half_rho_A"\n' + declared + area
+    with pytest.raises(InputError, match=r"force coefficients of OpenFOAM.*reader = 'columns'"):
+        reduced(tmp_path, "coefficient.dat", keys)
+    assert_means(reduced(tmp_path, "coefficient.dat", 'reader = "columns"\n' + keys))

@@ -24,7 +24,7 @@ from made_campaigns import (
 
 from ident.captive.campaign import read_campaign
 from ident.captive.headers import column
-from ident.captive.quantities import powers_of
+from ident.captive.quantities import powers_of, split
 from ident.checks.check import check_campaign
 from sim.files.errors import InputError
 
@@ -316,3 +316,43 @@ def test_words_for_signs_and_a_d_for_the_point_in_file_names(tmp_path, written, 
 
 def test_the_usual_table_is_read_as_it_was(tmp_path):
     assert_values(read(tmp_path, table(), tidy()))
+
+
+def test_the_names_of_a_table_in_a_comment(tmp_path):
+    text = "# Tank 2\n#beta_deg,X_N,Y_N,N_Nm\n# calm\n" + "".join(f"{b},1,2,3\n" for b in (2, 4))
+    runs = read(tmp_path, text, tidy('header_pattern = "^#beta"\ndelimiter = ","'))
+    assert np.degrees(runs["beta"]).tolist() == pytest.approx([2.0, 4.0])
+
+
+@pytest.mark.parametrize(
+    ("header", "declared", "words"),
+    [
+        ("Y p-p [N]", "Y_amp [N]", "another size"),
+        ("Y peak to peak", "Y_amp [N]", "another size"),
+        ("double amplitude [m]", "displacement [m]", "another size"),
+        ("Y rms", "Y [N]", "another size"),
+        ("Y phase lag [deg]", "Y_phase [deg]", "the opposite.*Y_lag"),
+        ("Y lead [deg]", "Y_lag [deg]", "the opposite.*Y_phase"),
+        ("Y phase (vel) [deg]", "Y_phase [deg]", "another reference"),
+    ],
+)
+def test_a_size_or_phase_of_another_meaning_asks_for_a_factor(header, declared, words):
+    with pytest.raises(InputError, match=words):
+        column(header, declared, "f")
+    assert column(header, declared, "f", [header]).quantity == split(declared)[0]
+
+
+@pytest.mark.parametrize("header", ["Fx pressure", "Y peak", "s_X", "Y black", "lagoon Y"])
+def test_words_that_are_like_these_pass(header):
+    assert column(header, "Y_phase [deg]", "f").quantity == "Y_phase"
+
+
+def test_a_factor_makes_newtons_of_volts(tmp_path):
+    text = "beta_deg,bridge [mV],Y_N,N_Nm\n" + "".join(f"{b},-2,2,3\n" for b in (2, 4))
+    named = 'bridge = "X [N]"'
+    with pytest.raises(InputError, match="unit 'mV', declared as 'N'"):
+        read(tmp_path, text, tidy("", named))
+    runs = read(tmp_path, text, tidy("", named + "\n[source.factor]\nbridge = 50.0"))
+    assert runs["X"].tolist() == pytest.approx([-100.0, -100.0])
+    with pytest.raises(InputError, match="unit 'kN', declared as 'N'"):
+        read(tmp_path, text.replace("mV", "kN"), tidy("", named + "\n[source.factor]\nbridge = 50.0"))

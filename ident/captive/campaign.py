@@ -249,6 +249,7 @@ def _converted(runs: pd.DataFrame, folder: Path, header: CampaignFile, vehicle: 
     """Runs as read, named once each and turned to the program's frame at full scale, all of them finite."""
     where = str(folder / "campaign.toml")
     runs["run_id"] = _own_names(runs)
+    runs = runs.drop(columns="of_table", errors="ignore")
     runs["copy_of"] = _originals(folder, runs)
     _check_used(header, runs, where)
     point = frame.vector([header.moment_point.x_m, header.moment_point.y_m, header.moment_point.z_m])
@@ -308,7 +309,11 @@ def _in_program_frame(runs: pd.DataFrame, header: CampaignFile, frame: Frame, wh
 
 
 def _own_names(runs: pd.DataFrame) -> pd.Series:
-    """Run names, with their file before those that stand in several files: sheets number their runs anew."""
+    """Run names, with their file, or worksheet, before those that stand in several: sheets number their runs anew."""
+    if "of_table" in runs:
+        table = runs["of_table"].fillna("").astype(str)
+        several = table.groupby([runs["run_id"], runs["file"]]).transform("nunique") > 1
+        runs = runs.assign(run_id=runs["run_id"].where(~several, table + "/" + runs["run_id"].astype(str)))
     files = runs.groupby("run_id")["file"].transform("nunique")
     shared = files > 1
     stem = runs["file"].map(lambda file: Path(str(file)).name.partition(".")[0])

@@ -77,6 +77,29 @@ _MEANT = {
 # A radius that is given as a part of the length, and one that is twice itself.
 _BY_LENGTH = re.compile(r"(?i)R0?\s*/\s*L(?:pp|oa|bp|wl)?")
 _DIAMETER = re.compile(r"(?i)^d\b|\bdia(?:m\w*)?\b")
+# Sizes of an oscillation that are no amplitude, and phases that are not what they are declared as.
+_NO_AMPLITUDE = re.compile(
+    r"(?i)(?<![a-z])(?:p(?:ea)?k?\s?-?\s?(?:to\s?-?\s?)?p(?:ea)?k?|double\s?-?\s?amp\w*|r\.?m\.?s\.?)(?![a-z])"
+)
+_BEHIND_IT = re.compile(r"(?i)(?<![a-z])(?:lag(?:s|ged|ging)?|behind|delay\w*|retard\w*)(?![a-z])")
+_AHEAD = re.compile(r"(?i)(?<![a-z])(?:lead\w*|ahead|advance\w*)(?![a-z])")
+_OF_ANOTHER = re.compile(r"(?i)(?<![a-z])(?:vel(?:oc\w*)?|acc(?:el\w*)?|cos(?:ine)?)(?![a-z])")
+
+
+def _of_an_oscillation(name: str, header: str, place: str) -> None:
+    """Refuse a declared header that says it is no amplitude, or another phase than the declared one."""
+    kind = name.rpartition("_")[2].rstrip("23")
+    if not name.startswith("sigma_") and owner(name) not in ("time", "frequency") and _NO_AMPLITUDE.search(header):
+        text = "a factor in [source.factor]: 0.5 of a double amplitude, 1.4142 of a root mean square, 1.0 of neither"
+        raise InputError(place, f"a header that names another size, declared as {name}", text)
+    other = {"phase": _BEHIND_IT, "lag": _AHEAD}.get(kind)
+    if other is not None and other.search(header):
+        meant = name.replace("phase", "lag") if kind == "phase" else name.replace("lag", "phase")
+        text = f"{meant}; or a factor of 1.0 in [source.factor]"
+        raise InputError(place, f"a header that says the opposite, declared as {name}", text)
+    if other is not None and _OF_ANOTHER.search(header):
+        text = "phases to the sine of the displacement; or a factor of 1.0 in [source.factor] where these are"
+        raise InputError(place, f"a header that names another reference, declared as {name}", text)
 
 
 def _contradiction(quantity: str, header: str, unit: str, place: str) -> None:
@@ -160,6 +183,18 @@ def _meant(header: str) -> str:
     return f'{meant}: "{header[:40]}" = "{meant} [...]" in [source.columns]' if meant else usual
 
 
+def _refuse_other_sizes(header: str, declared: str | None, named: str, place: str) -> None:
+    """Refuse a header whose numbers are a multiple, a diameter or another size of an oscillation, without a factor."""
+    if _TIMES.search(header) or _other_multiple(header, declared):
+        text = "a factor in [source.factor]: what a value is multiplied by to give the quantity"
+        raise InputError(place, "a header that names a multiple", text)
+    if declared is not None and named:
+        _of_an_oscillation(split(declared)[0], split(header)[0] or header, place)
+    if named == "R0" and declared is not None and _DIAMETER.search(split(header)[0]):
+        text = f'a factor in [source.factor]: "{split(header)[0][:40]}" = 0.5, or 1.0 where it is the radius'
+        raise InputError(place, "a header that names a diameter, declared as the radius R0", text)
+
+
 def column(header: str, declared: str | None, where: str, factors: Collection[str] = ()) -> Column:
     """What a column is, from its header and what the campaign declares it to be.
 
@@ -184,12 +219,7 @@ def column(header: str, declared: str | None, where: str, factors: Collection[st
         return replace(multiple, factor=1.0) if _factored(header, multiple.quantity, factors) else multiple
     named = owner(split(header if declared is None else declared)[0].removesuffix("'"))
     if not _factored(header, named, factors):
-        if _TIMES.search(header) or _other_multiple(header, declared):
-            text = "a factor in [source.factor]: what a value is multiplied by to give the quantity"
-            raise InputError(place, "a header that names a multiple", text)
-        if named == "R0" and declared is not None and _DIAMETER.search(split(header)[0]):
-            text = f'a factor in [source.factor]: "{split(header)[0][:40]}" = 0.5, or 1.0 where it is the radius'
-            raise InputError(place, "a header that names a diameter, declared as the radius R0", text)
+        _refuse_other_sizes(header, declared, named, place)
     if declared is not None and declared in suffixed():
         quantity, scale = suffixed()[declared]
         if owner(quantity) != declared or "" in units()[owner(quantity)]:
@@ -198,7 +228,12 @@ def column(header: str, declared: str | None, where: str, factors: Collection[st
     if declared is not None and unit is None:
         unit = split(header)[1]
     elif declared is not None:
-        _contradiction(owner(name.removesuffix("'")), header, unit or "", place)
+        quantity = owner(name.removesuffix("'"))
+        stated = split(header)[1] or ""
+        # With a factor, what stands in the file may be of another kind: volts of a bridge.
+        calibrated = _factored(header, quantity, factors) and is_unit(stated) and factor(quantity, stated) is None
+        if not calibrated:
+            _contradiction(quantity, header, unit or "", place)
     if name.endswith("'") and owner(name[:-1]) in PRIMED:
         name, unit = name[:-1], "-" if unit is None else unit
     known = owner(name)

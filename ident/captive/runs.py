@@ -132,6 +132,9 @@ def _read(
         return pd.DataFrame(), [], error, uses
     turned = source.reduction is not None and source.reduction.kind == "oscillatory"
     table = table.assign(file=name, files=source.files, axes="body" if turned else axes_of(source, header))
+    if source.table:
+        # Its runs are numbered by themselves.
+        table = table.assign(of_table=source.table)
     refuse_idle_quantities(table)
     refuse_axes_of_published(table, source, where)
     return outside_excluded(table, source, where), reduced, None, uses

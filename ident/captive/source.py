@@ -46,7 +46,7 @@ LOOKED_AT = {
     "starccm": (*_TEXT_KEYS, *_COLUMN_KEYS, "header_pattern", "units_row"),
     "columns": (*_TEXT_KEYS, *_COLUMN_KEYS, "header_pattern", "names", "widths"),
     "parquet": _COLUMN_KEYS,
-    "workbook": (*_COLUMN_KEYS, "table", "header_pattern", "units_row", "skip"),
+    "workbook": (*_COLUMN_KEYS, "table", "header_pattern", "units_row", "skip", "decimal", "thousands"),
     "matlab": (*_COLUMN_KEYS, "table", "names"),
     "hdf5": (*_COLUMN_KEYS, "table", "names"),
     "netcdf": (*_COLUMN_KEYS, "table", "names"),

@@ -44,7 +44,8 @@ def with_units(names: Sequence[str], units: Sequence[str], source: Source) -> li
     declared = {*source.columns, *(name for one in source.subtract for name in one.columns)}
     named = []
     for name, unit in zip(names, units, strict=True):
-        bare = split(name)[1] is None and name not in suffixed() and (name in declared or owner(name.rstrip("'")))
+        # A declared name is no quantity by itself: t may be the time.
+        bare = split(name)[1] is None and (name in declared or (name not in suffixed() and owner(name.rstrip("'"))))
         named.append(f"{name} [{unit.strip()}]" if bare and unit.strip() else name)
     return named
 
@@ -153,6 +154,33 @@ def array_sheet(
     return Sheet(path, max(first_row - 1, 0), header, values, cells, _PLAIN, first_row)
 
 
+def joined(
+    path: Path, names: list[str], plots: list[dict[float, float]], source: Source, row: int, blank: Sequence[str] = ()
+) -> Sheet:
+    """Curves over the abscissae that all of them have.
+
+    Parameters
+    ----------
+    path, source : For the checks.
+    names : Of the abscissa, then of each curve.
+    plots : Abscissa -> value, a curve each.
+    row : Of the names, for the message.
+    blank : Further columns, which hold no numbers.
+
+    Raises
+    ------
+    InputError
+        For curves without a common abscissa.
+    """
+    common = sorted(set(plots[0]).intersection(*plots[1:]))
+    if not common:
+        text = "plots of the same iterations or times"
+        raise InputError(f"{path}, row {row} (header)", f"no {names[0]} that all plots have", text)
+    columns = [np.array(common)] + [np.array([series[a] for a in common]) for series in plots]
+    columns += [np.full(len(common), np.nan) for _ in blank]
+    return array_sheet(path, [*names, *blank], columns, source, row + 1)
+
+
 def _written(cell: Any) -> str:
     if cell is None:
         return ""
@@ -173,6 +201,9 @@ def _numbers(path: Path, rows: Sequence[int], name: str, cells: Any, clocks: Clo
     lost = np.zeros(len(cells), dtype=bool)
     if isinstance(cells, np.ndarray) and cells.dtype.kind in "iuf":
         values = cells.astype(float)
+        if clocks is not None and cells.dtype.kind in "iu" and cells.size and int(cells.min()) > LARGEST:
+            # Of microseconds or nanoseconds of an epoch.
+            values = values / (1e9 if int(cells.min()) > 1e3 * LARGEST else 1e6)
     else:
         read = []
         for cell in cells:

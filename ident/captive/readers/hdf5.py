@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from ident.captive.quantities import split
 from ident.captive.readers.arrays import array_sheet, chosen, needs, of_one_length, with_units
 from ident.captive.readers.sheet import Sheet
 from ident.captive.source import Source
@@ -41,11 +42,38 @@ def open_hdf5(path: Path, source: Source) -> Sheet:
     try:
         with h5py.File(path, "r") as opened:
             groups: dict[str, dict[str, tuple[np.ndarray, str]]] = {}
-            _collect(h5py, opened, "", groups, source)
+            objects: dict[str, str] = {}
+            _collect(h5py, opened, "", groups, source, objects)
     except (OSError, RuntimeError, KeyError, ValueError) as error:
         raise InputError(str(path), f"not an HDF5 file: {str(error)[:100]}", "a whole file") from error
+    refuse_objects(path, objects, bool(groups), source)
     name = chosen(path, list(groups), source, "group")
     return _sheet(path, groups[name], source)
+
+
+def refuse_objects(path: Path, objects: dict[str, str], others: bool, source: Source) -> None:
+    """Refuse objects of MATLAB (tables, timetables, times) and arrays of several dimensions where they are meant.
+
+    Parameters
+    ----------
+    path, source : For the message, and for what is declared.
+    objects : Variable -> its class, or its size.
+    others : Whether the file holds columns beside them.
+
+    Raises
+    ------
+    InputError
+        For one that a key names, or the first of a file that holds nothing else.
+    """
+    meant = {source.table, *source.columns, *(split(h)[0] for h in source.columns)}
+    for name, kind in objects.items():
+        if name.rpartition("/")[2] in meant or name in meant or not others:
+            if "x" in kind:
+                raise InputError(f"{path}, {name[:60]}", f"an array of {kind}", "vectors: a variable or a file a run")
+            how = "columns as vectors: s = table2struct(t, 'ToScalar', true); save('run.mat', '-struct', 's')"
+            how += "; t = timetable2table(tt) before" if kind == "timetable" else ""
+            how = "seconds as numbers: seconds(t - t(1))" if kind in ("datetime", "duration") else how
+            raise InputError(f"{path}, variable {name[:60]}", f"an object of MATLAB ({kind[:40]})", how)
 
 
 def _sheet(path: Path, vectors: dict[str, tuple[np.ndarray, str]], source: Source) -> Sheet:
@@ -72,18 +100,27 @@ def unpacked(values: np.ndarray, attributes: Any) -> np.ndarray:
     return np.where(blank, np.nan, made.astype(float)) if blank.any() else made
 
 
-def _collect(h5py: Any, group: Any, name: str, groups: dict[str, Any], source: Source) -> None:
+def _collect(h5py: Any, group: Any, name: str, groups: dict[str, Any], source: Source, objects: dict[str, str]) -> None:
     """Columns of every group, by its path; a compound dataset or a matrix is a group of its own."""
     vectors: dict[str, tuple[np.ndarray, str]] = {}
     for key, item in group.items():
         path = f"{name}/{key}".lstrip("/")
+        if item is None:
+            # A link whose target is not there.
+            continue
         if isinstance(item, h5py.Group):
             if not key.startswith("#"):
-                _collect(h5py, item, path, groups, source)
+                _collect(h5py, item, path, groups, source, objects)
             continue
         attributes = {str(k): v for k, v in item.attrs.items() if k not in _OF_STRUCTURE}
         stated = unit(_text(next((v for k, v in attributes.items() if k.lower() in ("units", "unit")), "")))
-        if item.dtype.names:
+        if "MATLAB_object_decode" in attributes:
+            objects[path] = _text(attributes.get("MATLAB_class"))
+        elif h5py.check_ref_dtype(item.dtype) is not None:
+            values = _referred(h5py, group.file, item, path, groups, source, objects)
+            if values is not None:
+                vectors[key] = (values, "")
+        elif item.dtype.names:
             table = item[()]
             groups[path] = {n: (np.asarray(table[n]).ravel(), "") for n in item.dtype.names if table[n].ndim == 1}
         elif item.ndim <= 1 or (item.ndim == 2 and 1 in item.shape):
@@ -91,15 +128,46 @@ def _collect(h5py: Any, group: Any, name: str, groups: dict[str, Any], source: S
                 values = unpacked(np.ravel(item[()]), attributes)
                 text = item.dtype.kind in "SUO"
                 vectors[key] = (np.array([_text(v) for v in values], dtype=object) if text else values, stated)
-        elif item.ndim == 2 and item.dtype.kind in "iuf":
-            labels = source.names or [_text(v) for v in np.ravel(item.attrs.get("columns", []))]
-            values = unpacked(item[()], attributes)
-            # MATLAB stores its columns as rows.
-            values = values if len(labels) == values.shape[1] else values.T
-            if len(labels) == values.shape[1]:
-                groups[path] = {str(n): (values[:, i], "") for i, n in enumerate(labels)}
+        elif item.ndim == 2 and item.dtype.kind in "iuf" and (matrix := _matrix(item, attributes, source)):
+            groups[path] = matrix
+        elif item.dtype.kind in "iuf":
+            objects[path] = " x ".join(map(str, item.shape))
     if any(len(v) > 1 for v, _ in vectors.values()):
         groups[name or "/"] = vectors
+
+
+def _matrix(item: Any, attributes: dict[str, Any], source: Source) -> dict[str, tuple[np.ndarray, str]]:
+    """The columns of a matrix that has a name for each; empty for one without."""
+    labels = source.names or [_text(v) for v in np.ravel(attributes.get("columns", []))]
+    values = unpacked(item[()], attributes)
+    # MATLAB stores its columns as rows.
+    values = values if len(labels) == values.shape[1] else values.T
+    if len(labels) != values.shape[1]:
+        return {}
+    return {str(n): (values[:, i], "") for i, n in enumerate(labels)}
+
+
+def _referred(
+    h5py: Any, file: Any, item: Any, path: str, groups: dict[str, Any], source: Source, objects: dict[str, str]
+) -> np.ndarray | None:
+    """What references lead to, as MATLAB 7.3 stores cells and arrays of structs: structs become groups.
+
+    Returns
+    -------
+    A column where each of them is one number or word, else None.
+    """
+    values = []
+    for i, reference in enumerate(np.ravel(item[()]), start=1):
+        target = file[reference] if reference else None
+        if isinstance(target, h5py.Group):
+            _collect(h5py, target, f"{path}({i})", groups, source, objects)
+        elif target is not None and target.dtype.kind in "iuf":
+            stored = np.ravel(target[()])
+            word = _text(target.attrs.get("MATLAB_class")) == "char"
+            values.append("".join(map(chr, stored)) if word else stored[0] if stored.size == 1 else None)
+    if len(values) != item.size or any(v is None for v in values):
+        return None
+    return np.array(values, dtype=object if any(isinstance(v, str) for v in values) else None)
 
 
 def open_netcdf(path: Path, source: Source) -> Sheet:
@@ -111,8 +179,11 @@ def open_netcdf(path: Path, source: Source) -> Sheet:
         For a file that is not netCDF, or holds no variables of one length.
     """
     with path.open("rb") as stream:
-        if stream.read(4) == b"\x89HDF":
-            return open_hdf5(path, source)
+        start = stream.read(4)
+    if start == b"\x89HDF":
+        return open_hdf5(path, source)
+    if start == b"CDF\x05":
+        raise InputError(str(path), "a netCDF file of 64-bit data (CDF-5)", "netCDF 3 or 4: nccopy -k netCDF-4")
     from scipy.io import netcdf_file
 
     try:
@@ -123,8 +194,10 @@ def open_netcdf(path: Path, source: Source) -> Sheet:
                 for name, values, attributes in read
                 if values.ndim <= 1 and values.dtype.kind in "iuf" and values.size
             }
+            wide = {k: " x ".join(map(str, v.shape)) for k, v, _ in read if v.ndim > 1 and v.dtype.kind in "iuf"}
     except (OSError, ValueError, TypeError, IndexError, KeyError) as error:
         raise InputError(str(path), f"not a netCDF file: {str(error)[:100]}", "a whole file") from error
+    refuse_objects(path, wide, any(len(v) > 1 for v, _ in vectors.values()), source)
     if not any(len(v) > 1 for v, _ in vectors.values()):
         raise InputError(str(path), "no variables of one dimension", "variables of one length")
     return _sheet(path, vectors, source)

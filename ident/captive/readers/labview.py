@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ident.captive.quantities import known_unit
-from ident.captive.readers.arrays import array_sheet, chosen, needs, of_one_length, with_units
+from ident.captive.readers.arrays import array_sheet, chosen, joined, needs, of_one_length, with_units
 from ident.captive.readers.sheet import Sheet
 from ident.captive.readers.table import open_csv
-from ident.captive.readers.text import head
+from ident.captive.readers.text import Dialect, blocks, head
 from ident.captive.source import Source
 from sim.files.errors import InputError
 
 _END = "***End_of_Header***"
+_ABSCISSA = "X_Value"
 
 
 def open_tdms(path: Path, source: Source) -> Sheet:
@@ -69,10 +72,13 @@ def _unit(properties: dict[str, object]) -> str:
 def open_lvm(path: Path, source: Source) -> Sheet:
     """A LabVIEW measurement file: the table below its last header, tabs or commas and units as the header says.
 
+    Where the column X_Value is left empty (X_Columns No), it is made of the header's X0 and Delta_X; channels with
+    an X_Value each (X_Columns Multi) are joined where all of them have one.
+
     Raises
     ------
     InputError
-        For a file without the end of its header, or with more than one block of data.
+        For a file without the end of its header, with more than one block of data, or channels of several increments.
     """
     first = head(path, source.encoding)
     ends = [i for i, line in enumerate(first.text) if line.startswith(_END)]
@@ -80,19 +86,75 @@ def open_lvm(path: Path, source: Source) -> Sheet:
         raise InputError(str(path), f"no line {_END}", "a LabVIEW measurement file with its header")
     words = dict(p for line in first.text for p in [line.rstrip("\t").partition("\t")[::2]] if p[1])
     separator = {"Tab": "\t", "Comma": ","}.get(words.get("Separator", "Tab").strip(), "\t")
-    decimal = words.get("Decimal_Separator", ".").strip()[:1] or "."
+    decimal = source.decimal or words.get("Decimal_Separator", ".").strip()[:1] or "."
     names = first.text[ends[-1] + 1] if ends[-1] + 1 < len(first.text) else ""
-    layout = {"header_pattern": "^" + re.escape(names[:120]), "delimiter": separator}
-    layout |= {} if source.decimal else {"decimal": decimal}
-    skip = source.skip or r"\*\*\*End_of_Header\*\*\*"
+    # What the last header says of each channel.
+    said = {line.split(separator)[0]: line.split(separator)[1:] for line in first.text[: ends[-1]]}
+    units = [u.strip() if known_unit(u.strip()) else "" for u in said.get("Y_Unit_Label", [])]
+    if names.split(separator).count(_ABSCISSA) > 1:
+        return _own_abscissae(path, source, first.rows[ends[-1] + 1], Dialect(separator, decimal), units)
+    layout = {"header_pattern": "^" + re.escape(names[:120]), "delimiter": separator, "decimal": decimal}
+    skip = source.skip or re.escape(_END)
     sheet = open_csv(path, source.model_copy(update={**layout, "skip": skip}))
-    if "X_Value" in sheet.header and sheet.header.count("X_Value") > 1:
-        raise InputError(
-            sheet.where, "an X_Value for each channel", "one X column (X_Columns One), or a file a channel"
-        )
-    units = next((line for line in reversed(first.text[: ends[-1]]) if line.startswith("Y_Unit_Label")), "")
-    stated = [u.strip() for u in units.split(separator)[1:]]
-    at = 1 if sheet.header[:1] == ["X_Value"] else 0
-    beside = [""] * at + [u if known_unit(u) else "" for u in stated]
+    beside = [""] * (sheet.header[:1] == [_ABSCISSA]) + units
     beside += [""] * (len(sheet.header) - len(beside))
+    below = first.text[ends[-1] + 2] if ends[-1] + 2 < len(first.text) else ""
+    if sheet.header[:1] == [_ABSCISSA] and below.startswith(separator):
+        sheet = _with_clock(sheet, said, decimal)
     return replace(sheet, header=with_units(sheet.header, beside[: len(sheet.header)], source))
+
+
+def _with_clock(sheet: Sheet, said: dict[str, list[str]], decimal: str) -> Sheet:
+    """A sheet whose first column, left empty, is the time that the header states."""
+    stated = {key: {w.strip() for w in said.get(key, []) if w.strip()} for key in ("X0", "Delta_X")}
+    numbers = {key: [Dialect(decimal=decimal).number(w) for w in values] for key, values in stated.items()}
+    if any(len(values) != 1 or values[0] is None for values in numbers.values()):
+        wrong = f"an empty {_ABSCISSA}, and X0 {sorted(stated['X0'])}, Delta_X {sorted(stated['Delta_X'])}"
+        raise InputError(sheet.where, wrong[:150], "one start and one increment for all channels")
+    start, step = float(numbers["X0"][0] or 0.0), float(numbers["Delta_X"][0] or 0.0)
+
+    def values(wanted: list[int], clock: int = -1) -> Iterator[NDArray[np.float64]]:
+        measured = [i for i in wanted if i != 0]
+        done = 0
+        for block in sheet.numbers(measured, clock if clock != 0 else -1):
+            whole = np.empty((len(block), len(wanted)))
+            whole[:, [k for k, i in enumerate(wanted) if i != 0]] = block
+            whole[:, [k for k, i in enumerate(wanted) if i == 0]] = (start + step * np.arange(done, done + len(block)))[
+                :, None
+            ]
+            done += len(block)
+            yield whole
+
+    return replace(sheet, numbers=values)
+
+
+def _own_abscissae(path: Path, source: Source, header_row: int, dialect: Dialect, units: list[str]) -> Sheet:
+    """Channels with an X_Value each, joined where all of them have one."""
+    names: list[str] = []
+    blank: list[str] = []
+    series: list[dict[float, float]] = []
+    for block in blocks(path, source.encoding, skip=source.skip):
+        for row, line in zip(block.rows, block.text, strict=True):
+            cells = [cell.strip() for cell in line.split(dialect.delimiter)]
+            if row < header_row:
+                continue
+            if row == header_row:
+                names = [cells[k + 1] for k, cell in enumerate(cells[:-1]) if cell == _ABSCISSA]
+                series = [{} for _ in names]
+                blank = [cell for cell in cells[2 * len(names) :] if cell]
+                continue
+            for k, channel in enumerate(series):
+                pair = cells[2 * k : 2 * k + 2]
+                if len(pair) < 2 or not any(pair):
+                    continue
+                at, value = (dialect.number(cell) for cell in pair)
+                if at is None or value is None:
+                    place = f"{path}, row {row}, column {names[k][:60]}"
+                    raise InputError(place, repr(" ".join(pair)[:60]), f"an {_ABSCISSA} and a number, or both blank")
+                channel[at] = value
+    if not any(series):
+        raise InputError(str(path), "no numbers", "rows below the header")
+    # A unit stands below its channel, nothing below its abscissa.
+    beside = (units[::2] if not any(units[1::2]) else units) + [""] * len(names)
+    header = with_units(names, beside[: len(names)], source)
+    return joined(path, [_ABSCISSA, *header], series, source, header_row, blank)

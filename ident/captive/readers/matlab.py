@@ -8,10 +8,13 @@ from typing import Any
 import numpy as np
 
 from ident.captive.readers.arrays import array_sheet, chosen, of_one_length
-from ident.captive.readers.hdf5 import open_hdf5
+from ident.captive.readers.hdf5 import open_hdf5, refuse_objects
 from ident.captive.readers.sheet import Sheet
 from ident.captive.source import Source
 from sim.files.errors import InputError
+
+# Where a file of version 7.3 says its version, whatever wrote the text before it.
+_VERSION_7_3 = b"\x00\x02"
 
 
 def open_matlab(path: Path, source: Source) -> Sheet:
@@ -25,10 +28,11 @@ def open_matlab(path: Path, source: Source) -> Sheet:
         For a file that is not MATLAB's, or holds no vectors of one length.
     """
     with path.open("rb") as stream:
-        start = stream.read(60)
-    if start.startswith((b"\x89HDF", b"MATLAB 7.3")):
+        start = stream.read(128)
+    if start.startswith((b"\x89HDF", b"MATLAB 7.3")) or start[124:126] == _VERSION_7_3:
         return open_hdf5(path, source)
     from scipy.io import loadmat
+    from scipy.io.matlab import MatlabOpaque
 
     try:
         stored = loadmat(str(path), squeeze_me=True, struct_as_record=False)
@@ -36,7 +40,13 @@ def open_matlab(path: Path, source: Source) -> Sheet:
         raise InputError(
             str(path), f"not a MATLAB file: {str(error)[:100]}", "a whole file of save -v7 or -v7.3"
         ) from error
-    variables = {k: v for k, v in stored.items() if not k.startswith("__")}
+    objects = {
+        v["s0"][0].decode("ascii", "replace"): v["s2"][0].decode("ascii", "replace")
+        for v in stored.values()
+        if isinstance(v, MatlabOpaque)
+    }
+    variables = {k: v for k, v in stored.items() if not isinstance(v, MatlabOpaque) and not str(k).startswith("__")}
+    refuse_objects(path, objects, bool(variables), source)
     return from_variables(path, variables, source)
 
 
@@ -53,6 +63,9 @@ def from_variables(path: Path, variables: dict[str, Any], source: Source) -> She
         name = chosen(path, [*groups], source, "variable")
         columns = groups[name]
         if all(k.isdigit() for k in columns):
+            if len(source.names) == len(columns["0"]) != len(columns):
+                # A channel a row.
+                columns = {str(i): row for i, row in enumerate(np.array(list(columns.values())).T)}
             if len(source.names) != len(columns):
                 text = f"names = [...] in [[source]], one for each of its {len(columns)} columns"
                 raise InputError(f"{path}, variable {name}", f"a matrix and {len(source.names)} names", text)
@@ -76,9 +89,23 @@ def _collect(name: str, value: Any, groups: dict[str, dict[str, Any]]) -> None:
     elif isinstance(value, np.ndarray) and value.ndim == 2 and 1 not in value.shape and value.dtype.kind in "iuf":
         groups[name] = {str(i): column for i, column in enumerate(value.T)}
     elif isinstance(value, np.ndarray) and value.dtype.kind == "O":
+        if rows := _of_single_values(value):
+            groups[name] = rows
         for i, inside in enumerate(np.ravel(value), start=1):
             if getattr(inside, "_fieldnames", None):
                 _collect(f"{name}({i})", inside, groups)
+
+
+def _of_single_values(structs: np.ndarray) -> dict[str, np.ndarray]:
+    """Columns of an array of structs whose fields are single numbers or words: a run each; empty for others."""
+    rows = np.ravel(structs)
+    names = getattr(rows[0], "_fieldnames", None) if rows.size else None
+    if not names or rows.size < 2 or any(getattr(r, "_fieldnames", None) != names for r in rows):
+        return {}
+    columns = {n: [getattr(r, n) for r in rows] for n in names}
+    if any(not isinstance(v, (str, int, float, np.number)) for values in columns.values() for v in values):
+        return {}
+    return {n: np.array(v, dtype=object if isinstance(v[0], str) else None) for n, v in columns.items()}
 
 
 def _is_column(value: Any) -> bool:

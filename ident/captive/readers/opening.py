@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import lzma
 import os
 import re
 from pathlib import Path
@@ -11,17 +12,18 @@ from ident.captive.readers.labview import open_lvm, open_tdms
 from ident.captive.readers.matlab import open_matlab
 from ident.captive.readers.parquet import open_parquet
 from ident.captive.readers.sheet import Sheet
-from ident.captive.readers.solvers import fluent_header, open_fluent, open_plots, open_su2, open_tecplot, plots
+from ident.captive.readers.solvers import fluent_header, is_xy, open_fluent, open_plots, open_su2, open_tecplot, plots
 from ident.captive.readers.spreadsheet import open_workbook
 from ident.captive.readers.table import open_columns, open_csv
-from ident.captive.readers.text import COMMENTS, Lines, head, opened, sniff
+from ident.captive.readers.text import COMMENTS, Lines, head, opened, packed, sniff
 from ident.captive.readers.universal import open_universal
 from ident.captive.source import Source
 from sim.files.errors import InputError
 from sim.files.inputs import check_regular
 
 _LOADS = ("forces", "movingForces", "force", "moment")
-_OUTPUTS = {"forces.dat", "movingForces.dat", "force.dat", "moment.dat", "coefficient.dat", "forceCoeffs.dat"}
+_OUTPUTS = {"forces.dat", "movingForces.dat", "force.dat", "moment.dat"}
+_COEFFICIENTS = {"coefficient.dat", "forceCoeffs.dat"}
 
 
 OPENERS = {
@@ -49,11 +51,14 @@ _BEGIN = {
     b"\x89HDF": "hdf5",
     b"CDF\x01": "netcdf",
     b"CDF\x02": "netcdf",
+    b"CDF\x05": "netcdf",
     b"TDSm": "tdms",
     b"LabVIEW Measurement": "lvm",
     b"    -1\n": "universal",
     b"    -1\r\n": "universal",
 }
+# Readers whose libraries open the file themselves.
+_WHOLE = ("parquet", "workbook", "matlab", "hdf5", "netcdf", "tdms", "universal")
 _ENDINGS = {".parquet": "parquet", ".mat": "matlab", ".nc": "netcdf"}
 
 
@@ -114,25 +119,33 @@ def reader_of(path: Path, source: Source) -> str:
         return source.reader
     if path.is_dir():
         return "openfoam"
+    if path.name in _COEFFICIENTS:
+        text = (
+            "reader = 'columns', header_pattern = '# Time', normalisation = 'half_rho_A' and [source.reference] beside"
+        )
+        raise InputError(str(path), "force coefficients of OpenFOAM", f"its forces; or {text}")
     if path.name in _OUTPUTS:
         text = "the case folder, or postProcessing/<function object>: restarts are read together"
         raise InputError(str(path), "one file of an OpenFOAM run", text)
     try:
         with opened(path) as stream:
             start = stream.read(20)
-    except (OSError, EOFError) as error:
+    except (OSError, EOFError, lzma.LZMAError) as error:
         reason = getattr(error, "strerror", None) or str(error)
         raise InputError(str(path), f"cannot be read: {reason}", "a readable file") from error
     said = next((reader for mark, reader in _BEGIN.items() if start.startswith(mark)), _ENDINGS.get(path.suffix, ""))
     if said:
         return "matlab" if said == "hdf5" and path.suffix == ".mat" else said
+    first = next(iter(head(path, source.encoding, skip=source.skip).text), "")
+    if re.match(r"(?i)\s*(TITLE|VARIABLES)\s*=", first):
+        return "tecplot"
     if source.header_pattern and source.delimiter in (",", ";", "\t"):
         return "table"
     if source.names or source.header_pattern:
         return "columns"
     lines = head(path, source.encoding, COMMENTS, source.skip).text
     first = next(iter(lines), "")
-    if fluent_header(lines) >= 0:
+    if fluent_header(lines) >= 0 or is_xy(lines):
         return "fluent"
     if "Time_Iter" in first and "Inner_Iter" in first:
         return "su2"
@@ -164,6 +177,10 @@ def open_sheet(path: Path, source: Source) -> Sheet:
             dialect = sniff(path, Lines(first.rows, first.text), source.delimiter, source.decimal, source.thousands)
             if plots([dialect.cells(first.text[0], f"{path}, row {first.rows[0]}")]):
                 return open_plots(path, source, dialect)
+    if reader in _WHOLE and packed(path):
+        raise InputError(
+            str(path), f"packed, and for the reader {reader}", "the file unpacked: text alone is read packed"
+        )
     return OPENERS[reader](path, source.model_copy(update={"reader": reader}))
 
 

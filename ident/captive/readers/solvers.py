@@ -6,11 +6,13 @@ import csv
 import math
 import re
 import shlex
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ident.captive.readers.arrays import array_sheet, chosen
+from ident.captive.readers.arrays import array_sheet, chosen, joined
 from ident.captive.readers.sheet import Sheet
 from ident.captive.readers.table import open_columns, open_csv
 from ident.captive.readers.text import Dialect, blocks, head
@@ -27,7 +29,7 @@ def fluent_header(lines: list[str]) -> int:
 
 
 def open_fluent(path: Path, source: Source) -> Sheet:
-    """A report file of Fluent: two lines of titles, ``("Time Step" "flow-time" "force-x")``, numbers.
+    """A report file of Fluent: two lines of titles, ``("Time Step" "flow-time" "force-x")``, numbers; or its XY plot.
 
     Raises
     ------
@@ -35,11 +37,41 @@ def open_fluent(path: Path, source: Source) -> Sheet:
         For a file without that line.
     """
     first = head(path, source.encoding, skip=source.skip)
+    if is_xy(first.text):
+        return _open_xy(path, source)
     at = fluent_header(first.text)
     if at < 0:
         raise InputError(str(path), 'no line ("..." "...") of names', "a report file as Fluent writes it")
     names = shlex.split(first.text[at].strip().strip("()"))
     return open_columns(path, source.model_copy(update={"names": names, "header_pattern": ""}))
+
+
+def is_xy(lines: list[str]) -> bool:
+    """Whether the first line is that of an XY plot file of Fluent."""
+    return bool(lines) and re.match(r'\s*\(title\s+"', lines[0]) is not None
+
+
+def _open_xy(path: Path, source: Source) -> Sheet:
+    """``(labels "Iteration" "fx")``, then a curve each: ``((xy/key/label "fx")``, pairs of numbers, ``)``."""
+    names: list[str] = []
+    curves: dict[str, dict[float, float]] = {}
+    for block in blocks(path, source.encoding, comments=("\0",), skip=source.skip):
+        for row, line in zip(block.rows, block.text, strict=True):
+            text = line.strip()
+            if label := re.match(r'\(\(xy/key/label\s+"([^"]*)"\)', text):
+                if label[1] in curves:
+                    raise InputError(f"{path}, row {row}", f"curve {label[1]!r} twice", "a label a curve")
+                curves[label[1]] = {}
+            elif text.startswith("(labels"):
+                names = re.findall(r'"([^"]*)"', text)
+            elif curves and text not in ("(", ")"):
+                pair = [_PLAIN.number(cell) for cell in text.split()]
+                if len(pair) != 2 or pair[0] is None or pair[1] is None:
+                    raise InputError(f"{path}, row {row}", repr(text[:40]), "an abscissa and a number")
+                curves[list(curves)[-1]][pair[0]] = pair[1]
+    if not names or not curves:
+        raise InputError(str(path), "no (labels ...) or no curve", "an XY plot file as Fluent writes it")
+    return joined(path, [names[0], *curves], list(curves.values()), source, 2)
 
 
 def open_su2(path: Path, source: Source) -> Sheet:
@@ -54,12 +86,16 @@ def open_su2(path: Path, source: Source) -> Sheet:
     if "Time_Iter" not in sheet.header or "Inner_Iter" not in sheet.header:
         return sheet
     every = np.vstack(list(sheet.numbers(list(range(len(sheet.header))))))
-    step = every[:, sheet.header.index("Time_Iter")]
-    if np.unique(step).size < 2:
-        return sheet
-    last = np.append(np.diff(step) != 0.0, True)
-    kept = every[last]
-    return array_sheet(path, sheet.header, list(kept.T), source, sheet.first_row)
+    kept = _last_iterations(sheet.header, every)
+    return sheet if kept is every else array_sheet(path, sheet.header, list(kept.T), source, sheet.first_row)
+
+
+def _last_iterations(header: Sequence[str], every: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The last inner iteration of each time step of an SU2 history; all rows of anything else."""
+    if "Time_Iter" not in header or "Inner_Iter" not in header:
+        return every
+    step = every[:, list(header).index("Time_Iter")]
+    return every if np.unique(step).size < 2 else every[np.append(np.diff(step) != 0.0, True)]
 
 
 def plots(rows: list[list[str]]) -> bool:
@@ -93,12 +129,7 @@ def open_plots(path: Path, source: Source, dialect: Dialect) -> Sheet:
                 place = f"{path}, row {row}, column {names[2 * k + 1][:60]}"
                 raise InputError(place, repr(" ".join(pair)[:60]), "an abscissa and a number, or both blank")
             series[at] = value
-    common = sorted(set(plots[0]).intersection(*plots[1:]))
-    if not common:
-        text = "plots of the same iterations or times"
-        raise InputError(f"{path}, row {lines[0][0]} (header)", f"no {names[0]} that all plots have", text)
-    columns = [np.array(common)] + [np.array([series[a] for a in common]) for series in plots]
-    return array_sheet(path, [names[0], *names[1::2]], columns, source, lines[0][0] + 1)
+    return joined(path, [names[0], *names[1::2]], plots, source, lines[0][0])
 
 
 def open_tecplot(path: Path, source: Source) -> Sheet:
@@ -112,6 +143,7 @@ def open_tecplot(path: Path, source: Source) -> Sheet:
     names: list[str] = []
     zones: dict[str, tuple[str, list[float], int]] = {}
     points: dict[str, dict[str, int]] = {}
+    shared: set[str] = set()
     key, place = "", 0
     listing = False
     for block in blocks(path, source.encoding, comments=("#",), skip=source.skip):
@@ -121,7 +153,7 @@ def open_tecplot(path: Path, source: Source) -> Sheet:
             if word == "VARIABLES" or (listing and text.startswith('"')):
                 listing = True
                 names += _names(text.partition("=")[2] if word == "VARIABLES" else text)
-            elif word in ("TITLE", "DATASETAUXDATA", "FILETYPE", "VARAUXDATA"):
+            elif word in ("TITLE", "DATASETAUXDATA", "FILETYPE", "VARAUXDATA", "AUXDATA"):
                 listing = False
             elif word == "ZONE" or (key and not zones[key][1] and re.match(r"[A-Z]+\s*=", text)):
                 listing = False
@@ -133,6 +165,8 @@ def open_tecplot(path: Path, source: Source) -> Sheet:
                     zones[key] = ("POINT", [], row)
                 packed = re.search(r"(?i)(?:DATAPACKING|\bF)\s*=\s*(?:FE)?(POINT|BLOCK)", text)
                 zones[key] = (packed[1].upper() if packed else zones[key][0], *zones[key][1:])
+                if re.search(r"(?i)\b(VARSHARELIST|PASSIVEVARLIST)\s*=", re.sub(r'"[^"]*"', "", text)):
+                    shared.add(key)
                 sizes = re.findall(r"\b([IJK])\s*=\s*(\d+)", re.sub(r'"[^"]*"', "", text).upper())
                 points.setdefault(key, {}).update({axis: int(size) for axis, size in sizes})
             else:
@@ -142,20 +176,38 @@ def open_tecplot(path: Path, source: Source) -> Sheet:
                     key = "zone 1"
                     zones[key] = ("POINT", [], row)
                 for cell in text.replace(",", " ").split():
-                    value = _PLAIN.number(cell)
-                    if value is None:
+                    # 400*1.5 stands for so many of it.
+                    many, _, last = cell.rpartition("*")
+                    value = _PLAIN.number(last)
+                    if value is None or (many and not re.fullmatch(r"\d{1,7}", many)):
                         raise InputError(f"{path}, row {row}, zone {key}", repr(cell[:40]), "a finite number")
-                    zones[key][1].append(value)
+                    zones[key][1].extend([value] * int(many or 1))
             place = row
     name = chosen(path, list(zones), source, "zone")
-    packing, values, row = zones[name]
-    stated = math.prod(points.get(name, {}).values()) * len(names) if points.get(name) else len(values)
+    if name in shared:
+        wrong = f"zone {name!r} leaves variables out (VARSHARELIST, PASSIVEVARLIST)"
+        raise InputError(f"{path}, row {zones[name][2]}", wrong, "every variable in its zone")
+    return _zone(path, name, names, zones[name], points.get(name, {}), place, source)
+
+
+def _zone(
+    path: Path,
+    name: str,
+    names: list[str],
+    zone: tuple[str, list[float], int],
+    sizes: dict[str, int],
+    last: int,
+    source: Source,
+) -> Sheet:
+    """The columns of one zone: packing, numbers and row of it, and its stated sizes."""
+    packing, values, row = zone
+    stated = math.prod(sizes.values()) * len(names) if sizes else len(values)
     if not names or not values or len(values) % len(names) or len(values) != stated:
         wrong = f"{len(values)} numbers for {len(names)} variables in zone {name!r}"
-        raise InputError(f"{path}, rows {row} to {place}", wrong, "as many of each variable")
+        raise InputError(f"{path}, rows {row} to {last}", wrong, "as many of each variable")
     table = np.array(values).reshape((-1, len(names)) if packing == "POINT" else (len(names), -1))
-    columns = list(table.T) if packing == "POINT" else list(table)
-    return array_sheet(path, names, columns, source, row + 1)
+    rows = _last_iterations(names, table if packing == "POINT" else table.T)
+    return array_sheet(path, names, list(rows.T), source, row + 1)
 
 
 def _names(text: str) -> list[str]:

@@ -3,21 +3,21 @@
 from __future__ import annotations
 
 import datetime
-import re
 import zipfile
 from pathlib import Path
 from typing import Any
 
 from ident.captive.patterns import search
 from ident.captive.readers.arrays import array_sheet, chosen, needs
-from ident.captive.readers.sheet import Sheet
+from ident.captive.readers.sheet import Sheet, ignored
+from ident.captive.readers.stored_cells import Stored, stored_cells
+from ident.captive.readers.text import Dialect
 from ident.captive.source import Source
 from sim.files.errors import InputError
 
-# A cell of a worksheet with a formula and no value behind it; one of a shared formula may be empty itself.
-_BARE = re.compile(rb'<c r="([A-Z]+)([0-9]+)"[^>]*>\s*<f(?:\s[^>]*)?(?:/>|>[^<]*</f>)\s*(?:<v\s*/>|<v>\s*</v>)?\s*</c>')
-# Bytes of a worksheet that is looked through for them.
-_LARGEST = 1 << 28
+_PASSWORD = "EncryptedPackage".encode("utf-16-le")
+# Bytes of a file that is looked through for it.
+_HEAD = 1 << 26
 
 
 def open_workbook(path: Path, source: Source) -> Sheet:
@@ -44,29 +44,14 @@ def open_workbook(path: Path, source: Source) -> Sheet:
             raise InputError(
                 str(path), wrong, "its files unpacked, or gzip; a workbook as xlsx, xlsb or ods"
             ) from error
+        with path.open("rb") as stream:
+            if _PASSWORD in stream.read(_HEAD):
+                wrong = "a workbook with a password"
+                raise InputError(str(path), wrong, "the workbook saved without one") from error
         raise InputError(str(path), f"not a workbook: {str(error)[:100]}", "a whole xlsx, xls, xlsb or ods") from error
     filled = [name for name, rows in sheets.items() if any(_filled(row) for row in rows)]
     name = chosen(path, filled, source, "worksheet")
     return _sheet(path, name, sheets[name], source)
-
-
-def _bare_formulas(path: Path) -> set[tuple[int, int]]:
-    """Row and column of the cells of all worksheets with a formula whose result was never stored: they read as blank.
-
-    Programs that write workbooks store the formula alone; Excel and LibreOffice store its result when they save.
-    """
-    found: set[tuple[int, int]] = set()
-    if not zipfile.is_zipfile(path):
-        return found
-    with zipfile.ZipFile(path) as packed:
-        for name in packed.namelist():
-            if re.match(r"xl/worksheets/[^/]+\.xml$", name) and packed.getinfo(name).file_size <= _LARGEST:
-                for letters, row in _BARE.findall(packed.read(name)):
-                    column = 0
-                    for letter in letters:
-                        column = 26 * column + letter - 64
-                    found.add((int(row), column))
-    return found
 
 
 def _visible(book: Any) -> list[str]:
@@ -97,19 +82,47 @@ def _sheet(path: Path, name: str, rows: list[list[Any]], source: Source) -> Shee
     if source.skip:
         body = [(i, row) for i, row in body if not search(source.skip, _joined(row))]
     kept = [k for k, n in enumerate(names) if n]
-    lost = [k for k, n in enumerate(names) if not n and any(len(r) > k and r[k] not in (None, "") for _, r in body)]
-    if lost:
-        raise InputError(f"{where}, row {top}", f"a column without a name ({lost[0] + 1})", "a name for every column")
+    for k in range(max((len(row) for _, row in body), default=0)):
+        if (k >= len(names) or not names[k]) and any(len(r) > k and r[k] not in (None, "") for _, r in body):
+            named = f"column {k + 1}"
+            if not ignored(named, source):
+                text = f'a name for every column; ignore = ["{named}"], or header_pattern below a title, in [[source]]'
+                raise InputError(f"{where}, row {top}", f"a column without a name ({named})", text)
+            names += [""] * (k + 1 - len(names))
+            names[k] = named
+            kept = sorted({*kept, k})
     if not kept or not body:
         raise InputError(where, "no names with rows below them", "a row of names, and header_pattern below a title")
-    bare = _bare_formulas(path)
-    for i, row in body if bare else ():
-        blank = next((k for k in kept if (i, k + 1) in bare and (len(row) <= k or row[k] in (None, ""))), None)
-        if blank is not None:
-            text = "results stored with their formulas: open the file in Excel or LibreOffice and save it"
-            raise InputError(f"{where}, row {i}, column {names[blank][:60]}", "a formula without its result", text)
-    columns = [[_cell(row[k]) if len(row) > k else None for _, row in body] for k in kept]
+    stored = stored_cells(path, name)
+    _refuse_unstored(stored, where, body, {k: names[k] for k in kept if not ignored(names[k], source)})
+    columns = [
+        [stored.errors.get((i, k + 1), _cell(row[k]) if len(row) > k else None) for i, row in body] for k in kept
+    ]
+    if source.decimal or source.thousands:
+        columns = _of_text(columns, where, source)
     return array_sheet(path, [names[k] for k in kept], columns, source, [i for i, _ in body])
+
+
+def _refuse_unstored(stored: Stored, where: str, body: list[tuple[int, list[Any]]], names: dict[int, str]) -> None:
+    """Refuse rows that are hidden, and formulas whose result is not in the file: they would read as blank or zero."""
+    for i, _ in body:
+        if i in stored.hidden:
+            text = "rows that are shown, or deleted; or skip in [[source]] for what its cells begin with"
+            raise InputError(f"{where}, row {i}", "a hidden row", text)
+        bare = next((name for k, name in names.items() if (i, k + 1) in stored.bare), None)
+        if bare is not None:
+            text = "results stored with their formulas: open the file in Excel or LibreOffice and save it"
+            raise InputError(f"{where}, row {i}, column {bare[:60]}", "a formula without its result", text)
+
+
+def _of_text(columns: list[list[Any]], where: str, source: Source) -> list[list[Any]]:
+    """Columns whose numbers may be stored as text, in the stated decimal mark."""
+    dialect = Dialect(decimal=source.decimal or ".", thousands=source.thousands)
+    read = [[dialect.number(cell) if isinstance(cell, str) else None for cell in column] for column in columns]
+    if all(value is None for column in read for value in column):
+        raise InputError(where, "decimal or thousands, and no number that is stored as text", "neither of these keys")
+    pairs = zip(columns, read, strict=True)
+    return [[cell if v is None else v for cell, v in zip(column, values, strict=True)] for column, values in pairs]
 
 
 def _joined(row: list[Any]) -> str:

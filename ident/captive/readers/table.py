@@ -182,6 +182,13 @@ def _below_title(path: Path, source: Source) -> tuple[Lines, str]:
     """The first lines from the header on, and the delimiter where the campaign or the file states it."""
     first = head(path, source.encoding, COMMENTS, source.skip)
     at = 0
+    if source.header_pattern and not any(search(source.header_pattern, line) for line in first.text):
+        # The line of names may be a comment.
+        first = head(path, source.encoding, skip=source.skip)
+        at = _pattern_row(path, first, source)
+        rows = [k for k in range(at + 1, len(first.rows)) if not first.text[k].lstrip().startswith(COMMENTS)]
+        names = first.text[at].lstrip("#%!/ \t")
+        return Lines([first.rows[k] for k in (at, *rows)], [names, *(first.text[k] for k in rows)]), source.delimiter
     if source.header_pattern:
         at = _pattern_row(path, first, source)
     elif first.text and (stated := re.fullmatch(r'"?sep=([,;\t])"?', first.text[0].strip(" "))):
@@ -214,7 +221,9 @@ def open_columns(path: Path, source: Source) -> Sheet:
         header, at = source.names, -1
     elif source.header_pattern:
         at = _pattern_row(path, first, source)
-        header = header_names(first.text[at])
+        # The line of dashes counts whether skip leaves it out or not.
+        every = head(path, source.encoding)
+        header = _ruled(every.text, every.rows.index(first.rows[at])) or header_names(first.text[at])
     else:
         text = "names = [...] or header_pattern = '...' in [[source]], see docs/readers.md"
         raise InputError(str(path), "columns without declared names", text)
@@ -234,6 +243,7 @@ def open_columns(path: Path, source: Source) -> Sheet:
             return _text_sheet(path, source, dialect, header, lines, row - 1)
     wrong = f"no line with {len(header)} numbers in the first {len(first.text)}"
     text = f"numbers for {', '.join(header)[:200]}; decimal, delimiter or widths = [...] where blanks do not part them"
+    text += "; names = [...] where a name holds a blank" if source.header_pattern else ""
     raise InputError(str(path), wrong, text)
 
 
@@ -246,6 +256,20 @@ def _columns_decimal(path: Path, below: Lines, header: list[str], source: Source
         (row, c) for row, cells in rows if len(cells) == len(header) for c in cells if all(map(form.fullmatch, cells))
     ]
     return decimal_mark(path, [(row, c) for row, c in full if "," in c or "." in c], None, source.thousands)
+
+
+def _ruled(lines: list[str], at: int) -> list[str]:
+    """Names above a line of dashes, a stretch a column, as XFOIL and XFLR5 print them; empty without such a line."""
+    below = lines[at + 1] if at + 1 < len(lines) else ""
+    if not re.fullmatch(r"\s*-{2,}(\s+-{2,})+\s*", below):
+        return []
+    stretches = [m.span() for m in re.finditer("-+", below)]
+    names: list[list[str]] = [[] for _ in stretches]
+    for word in re.finditer(r"[^\s#%!]+", lines[at]):
+        # Each word belongs to the stretch that it lies over most.
+        over = [min(word.end(), end) - max(word.start(), start) for start, end in stretches]
+        names[int(np.argmax(over))].append(word[0])
+    return [" ".join(words) for words in names] if all(names) else []
 
 
 def header_names(line: str) -> list[str]:

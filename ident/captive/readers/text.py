@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import bz2
 import csv
 import gzip
 import io
 import itertools
+import lzma
 import re
 import zlib
 from collections.abc import Iterator
@@ -19,6 +21,7 @@ from numpy.typing import NDArray
 
 from ident.captive.patterns import compiled
 from ident.captive.readers.times import FORMS, Clocks
+from ident.captive.readers.unread import BEGINNING, unread
 from ident.captive.source import Encoding
 from sim.files.errors import InputError
 
@@ -35,29 +38,9 @@ _EXACT: dict[str, Any] = {} if int(pd.__version__.split(".")[0]) >= 3 else {"flo
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eEdD][+-]?\d{1,3})?", re.ASCII)
 ENCODINGS = get_args(Encoding)
 COMMENTS = ("#", "%", "!", "//")
+_PACKED: dict[bytes, Any] = {b"\x1f\x8b": gzip.open, b"BZh": bz2.open, b"\xfd7zXZ": lzma.open}
 # A file that begins so says its encoding itself, or is no text.
 _MARKS = {b"\xef\xbb\xbf": "utf-8-sig", b"\xff\xfe": "utf-16", b"\xfe\xff": "utf-16"}
-_BINARY = {
-    b"PK\x03\x04": "a spreadsheet (xlsx, ods) or another archive",
-    b"\xd0\xcf\x11\xe0": "an Excel workbook (xls)",
-    b"\x89HDF": "an HDF5 or MATLAB 7.3 file",
-    b"MATLAB 5": "a MATLAB file",
-    b"TDSm": "a LabVIEW TDMS file",
-    b"%PDF": "a PDF",
-    b"\xff\xd8\xff": "a JPEG picture",
-    b"\x89PNG": "a PNG picture",
-    b"GIF8": "a GIF picture",
-    b"Rar!": "a RAR archive",
-    b"7z\xbc\xaf": "a 7-Zip archive",
-    b"BZh": "a bzip2 archive",
-    b"\xfd7zXZ": "an xz archive",
-    b"{\\rtf": "an RTF document",
-    b"CDF\x01": "a netCDF file",
-    b"CDF\x02": "a netCDF file",
-    b"SIMPLE  ": "a FITS file",
-    b"OggS": "a sound file",
-    b"RIFF": "a sound or film file",
-}
 # Blanks that tools put between groups of digits, dashes of typesetting for minus, full-width signs and digits.
 _SPELLED = str.maketrans(
     {
@@ -97,11 +80,18 @@ class Lines:
     ended: bool = True
 
 
-def opened(path: Path) -> IO[bytes]:
-    """A file to read, unpacked where it is a gzip archive."""
+def packed(path: Path) -> bool:
+    """Whether a file is a gzip, bzip2 or xz archive."""
     with path.open("rb") as stream:
-        packed = stream.read(2) == b"\x1f\x8b"
-    return cast(IO[bytes], gzip.open(path, "rb")) if packed else path.open("rb")
+        return stream.read(6).startswith(tuple(_PACKED))
+
+
+def opened(path: Path) -> IO[bytes]:
+    """A file to read, unpacked where it is a gzip, bzip2 or xz archive."""
+    with path.open("rb") as stream:
+        start = stream.read(6)
+    opener = next((o for mark, o in _PACKED.items() if start.startswith(mark)), None)
+    return cast(IO[bytes], opener(path, "rb")) if opener else path.open("rb")
 
 
 def _decoded(path: Path, encoding: str) -> Iterator[str]:
@@ -111,10 +101,9 @@ def _decoded(path: Path, encoding: str) -> Iterator[str]:
     at = 0
     try:
         with opened(path) as stream:
-            start = stream.read(8)
+            start = stream.read(BEGINNING)
             stream.seek(0)
-            kind = next((k for mark, k in _BINARY.items() if start.startswith(mark)), None)
-            if kind:
+            if kind := unread(start):
                 raise InputError(str(path), kind, "the sheet or the channels saved as CSV, or Parquet")
             marked = next((e for mark, e in _MARKS.items() if start.startswith(mark)), encoding)
             decoder = codecs.getincrementaldecoder(marked)()
@@ -134,7 +123,7 @@ def _decoded(path: Path, encoding: str) -> Iterator[str]:
                 yield decoder.decode(b"", final=True)
             except UnicodeDecodeError as error:
                 raise InputError(f"{path}, last byte", f"not {marked} text", "text that is not cut short") from error
-    except (OSError, EOFError, zlib.error) as error:
+    except (OSError, EOFError, zlib.error, lzma.LZMAError) as error:
         reason = getattr(error, "strerror", None) or str(error)
         raise InputError(str(path), f"cannot be read: {reason}", "a readable file") from error
 
@@ -387,6 +376,8 @@ def odd(cell: str) -> str:
         return "; a footnote mark: marks = { a = '...' } in [[source]] says which quality word it stands for"
     if re.fullmatch(r"\(\s*\d[\d.,]*\s*\)", cell):
         return "; a number in brackets may be negative or doubtful: write it with its sign"
+    if re.fullmatch(r"[+-]?\d[\d.]*,\d+", cell.strip()):
+        return "; or decimal (or thousands) = ',' in [[source]]"
     return ""
 
 

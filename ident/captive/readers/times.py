@@ -7,10 +7,15 @@ import re
 from dataclasses import dataclass
 
 _TIME = re.compile(r"(\d{1,2}):(\d{2}):(\d{2}(?:[.,]\d+)?)\s*([AaPp][Mm])?|(\d{1,3}):(\d{2}[.,]\d+)")
+# 20200501T120000.5, 01-May-2020, and microseconds or nanoseconds of an epoch.
+_BASIC = re.compile(r"(\d{4})(\d{2})(\d{2})T(\d{2})(\d{2})(\d{2}(?:[.,]\d+)?)")
+_NAMED = re.compile(r"(\d{1,2})[-. ](Jan|Feb|Mar|Apr|May|Jun|Jul|Aug|Sep|Oct|Nov|Dec)[a-z]*[-. ](\d{4})", re.IGNORECASE)
+_MONTHS = ["jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec"]
+_EPOCH = re.compile(r"\d{16}(?:\d{3})?", re.ASCII)
 _DATE = re.compile(r"(\d{4})[-/.](\d{1,2})[-/.](\d{1,2})|(\d{1,2})([-/.])(\d{1,2})[-/.](\d{2,4})")
 _ZONE = re.compile(r"(?:Z|UTC|[+-]\d{2}:?\d{2})$")
 _DAY = 86400.0
-FORMS = "hh:mm:ss, mm:ss.s, or an ISO date and time (2019-03-04T23:59:55.050)"
+FORMS = "hh:mm:ss, mm:ss.s, or a date and time (2019-03-04T23:59:55.050, 04-Mar-2019 23:59:55)"
 # Numbers that are no seconds: days of a spreadsheet between 1950 and 2120, milliseconds and microseconds of an epoch.
 _SERIAL = (18_000.0, 80_000.0)
 _FINE = 1e-3
@@ -33,6 +38,10 @@ class Clocks:
         are read alike as long as the record stays within a month.
         """
         text = _ZONE.sub("", cell.strip()).strip()
+        if _EPOCH.fullmatch(text):
+            return int(text) / (1e6 if len(text) == 16 else 1e9)
+        text = _BASIC.sub(r"\1-\2-\3T\4:\5:\6", text)
+        text = _NAMED.sub(lambda m: f"{m[3]}-{_MONTHS.index(m[2].lower()) + 1}-{m[1]}", text)
         date = _DATE.match(text)
         rest = text[date.end() :].lstrip("T ,;_-") if date else text
         time = _TIME.fullmatch(rest)

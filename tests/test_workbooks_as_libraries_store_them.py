@@ -1,0 +1,211 @@
+"""Workbooks of Excel and OpenDocument: the numbers that people see in them, whatever library stored them."""
+
+from __future__ import annotations
+
+import datetime
+import gzip
+import sys
+
+import numpy as np
+import pandas as pd
+import pytest
+from made_campaigns import (
+    BETA,
+    SERIES,
+    TIME,
+    VALUES,
+    assert_means,
+    assert_values,
+    campaign,
+    reduced,
+    runs_of,
+    tidy,
+)
+
+from ident.captive.campaign import read_campaign
+from sim.files.errors import InputError
+
+NAMES = ["beta_deg", "X_N", "Y_N", "N_Nm"]
+RUNS = np.column_stack([BETA, VALUES])
+CHANNELS = ["time_s", "X_N", "Y_N", "N_Nm"]
+
+
+def book(folder, name: str, rows, sheet: str = "drift", more: str = "") -> None:
+    folder.mkdir(parents=True, exist_ok=True)
+    path = folder / name
+    if name.endswith(".ods"):
+        with pd.ExcelWriter(path, engine="odf") as writer:
+            pd.DataFrame(rows).to_excel(writer, sheet_name=sheet, header=False, index=False)
+        return
+    import openpyxl
+
+    made = openpyxl.Workbook()
+    made.active.title = sheet
+    for row in rows:
+        made.active.append(list(row))
+    if more:
+        made.create_sheet(more).append(["a note"])
+    made.save(path)
+
+
+@pytest.mark.parametrize("name", ["runs.xlsx", "runs.ods"])
+def test_a_worksheet_is_a_table_of_runs(tmp_path, name):
+    book(tmp_path, name, [NAMES, *RUNS.tolist()])
+    assert_values(runs_of(tmp_path, name))
+
+
+def test_a_workbook_of_several_sheets_with_titles_units_and_comments(tmp_path):
+    rows = [["Tank 2, 2019"], [], ["beta", "X", "Y", "N"], ["deg", "kN", "N", "N m"]]
+    rows += [[b, x / 1000.0, y, n] for b, (x, y, n) in zip(BETA, VALUES.tolist(), strict=True)]
+    rows += [["mean of three"]]
+    book(tmp_path, "runs.xlsx", rows, more="notes")
+    keys = 'table = "drift"\nheader_pattern = "^beta"\nunits_row = true\nskip = "^mean"'
+    assert_values(runs_of(tmp_path, "runs.xlsx", keys))
+    with pytest.raises(InputError, match="2 worksheets"):
+        runs_of(tmp_path, "runs.xlsx", keys.replace('table = "drift"\n', ""))
+    with pytest.raises(InputError, match="no worksheet 'yaw'"):
+        runs_of(tmp_path, "runs.xlsx", keys.replace('"drift"', '"yaw"'))
+
+
+@pytest.mark.parametrize("kind", ["datetime", "time", "number"])
+def test_a_workbook_is_a_history_with_dates_or_times_of_day(tmp_path, kind):
+    start = datetime.datetime(2019, 3, 4, 23, 59, 55)
+    steps = [start + datetime.timedelta(seconds=float(t)) for t in TIME]
+    stamps = {"datetime": steps, "time": [s.time() for s in steps], "number": TIME.tolist()}[kind]
+    rows = [CHANNELS, *([t, *row] for t, row in zip(stamps, SERIES.tolist(), strict=True))]
+    book(tmp_path, "run.xlsx", rows)
+    assert_means(reduced(tmp_path, "run.xlsx"))
+
+
+def test_an_xlsx_of_another_writer(tmp_path):
+    import xlsxwriter
+
+    made = xlsxwriter.Workbook(str(tmp_path / "runs.xlsx"))
+    sheet = made.add_worksheet("drift")
+    for i, row in enumerate([NAMES, *RUNS.tolist()]):
+        sheet.write_row(i, 0, row)
+    made.close()
+    assert_values(runs_of(tmp_path, "runs.xlsx"))
+
+
+def test_a_formula_whose_result_was_never_stored_is_no_blank_cell(tmp_path):
+    book(tmp_path, "runs.xlsx", [NAMES, [2, "=-1000-234.5", 2750.25, 12500.0]], more="notes")
+    with pytest.raises(InputError, match=r"row 2, column X_N: a formula without its result"):
+        runs_of(tmp_path, "runs.xlsx", 'table = "drift"')
+
+
+def test_rows_of_a_worksheet_are_counted_with_its_empty_ones(tmp_path):
+    book(tmp_path, "runs.xlsx", [NAMES, *RUNS.tolist(), [], ["average", -1, 2, 3]])
+    with pytest.raises(InputError, match=r"row 6, column beta_deg"):
+        runs_of(tmp_path, "runs.xlsx")
+
+
+@pytest.mark.parametrize(("value", "words"), [(0, "a formula without its result"), (-1234.5, "")])
+def test_a_zero_in_the_place_of_a_result_is_no_load(tmp_path, value, words):
+    """xlsxwriter stores zero and that everything is to be calculated, unless it is told the result."""
+    import xlsxwriter
+
+    made = xlsxwriter.Workbook(str(tmp_path / "runs.xlsx"))
+    sheet = made.add_worksheet("drift")
+    for i, row in enumerate([NAMES, *RUNS.tolist()]):
+        sheet.write_row(i, 0, row)
+    sheet.write_formula("B2", "=-1000-234.5", None, value)
+    made.close()
+    if words:
+        with pytest.raises(InputError, match=rf"row 2, column X_N: {words}"):
+            runs_of(tmp_path, "runs.xlsx")
+    else:
+        assert_values(runs_of(tmp_path, "runs.xlsx"))
+
+
+def changed_book(folder, change) -> None:
+    """A workbook of the runs, changed by openpyxl before it is saved."""
+    import openpyxl
+
+    made = openpyxl.Workbook()
+    for row in [NAMES, *RUNS.tolist()]:
+        made.active.append(row)
+    change(made)
+    made.save(folder / "runs.xlsx")
+
+
+def test_a_cell_that_shows_an_error_is_named_and_blank_once_stated(tmp_path):
+    def change(made):
+        made.active["C3"] = "#DIV/0!"
+        made.active["C3"].data_type = "e"
+        made.create_sheet("empty")
+
+    changed_book(tmp_path, change)
+    with pytest.raises(InputError, match=r"row 3, column Y_N: '#DIV/0!'.*missing = \['#DIV/0!'\]"):
+        runs_of(tmp_path, "runs.xlsx")
+    assert runs_of(tmp_path, "runs.xlsx", 'missing = ["#DIV/0!"]')["Y"].isna().tolist() == [False, True, False]
+
+
+def test_what_another_worksheet_lacks_is_nothing_to_this_one(tmp_path):
+    def change(made):
+        made.active["C3"] = None
+        made.create_sheet("other")["C3"] = "=1+1"
+
+    changed_book(tmp_path, change)
+    assert runs_of(tmp_path, "runs.xlsx")["Y"].isna().tolist() == [False, True, False]
+
+
+@pytest.mark.parametrize("by", ["hand", "filter"])
+def test_a_hidden_row_is_no_run(tmp_path, by):
+    def change(made):
+        made.active.append([20.0, 1.0, 2.0, 3.0])
+        made.active.row_dimensions[5].hidden = True
+        if by == "filter":
+            made.active.auto_filter.ref = "A1:D5"
+
+    changed_book(tmp_path, change)
+    with pytest.raises(InputError, match=r"row 5: a hidden row"):
+        runs_of(tmp_path, "runs.xlsx")
+    assert_values(runs_of(tmp_path, "runs.xlsx", 'skip = "^20"'))
+
+
+def test_a_column_without_a_name_is_left_out_by_its_place(tmp_path):
+    """The index that pandas writes, and a note beside the table."""
+    pd.DataFrame(RUNS, columns=NAMES).to_excel(tmp_path / "runs.xlsx")
+    with pytest.raises(InputError, match=r"a column without a name \(column 1\).*ignore = \[.column 1.\]"):
+        runs_of(tmp_path, "runs.xlsx")
+    assert_values(runs_of(tmp_path, "runs.xlsx", 'ignore = ["column 1"]'))
+    changed_book(tmp_path, lambda made: made.active.cell(3, 9, "calm"))
+    assert_values(runs_of(tmp_path, "runs.xlsx", 'ignore = ["column 9"]'))
+
+
+def test_numbers_stored_as_text_are_read_in_the_stated_mark(tmp_path):
+    book(tmp_path, "runs.xlsx", [NAMES, *([repr(v).replace(".", ",") for v in row] for row in RUNS.tolist())])
+    assert_values(runs_of(tmp_path, "runs.xlsx", 'decimal = ","'))
+    with pytest.raises(InputError, match=r"row 2, column beta_deg: '2,0'.*decimal"):
+        runs_of(tmp_path, "runs.xlsx")
+    book(tmp_path, "runs.xlsx", [NAMES, *RUNS.tolist()])
+    with pytest.raises(InputError, match="no number that is stored as text"):
+        runs_of(tmp_path, "runs.xlsx", 'decimal = ","')
+
+
+def test_worksheets_number_their_runs_by_themselves(tmp_path):
+    def change(made):
+        other = made.create_sheet("turned")
+        for row in [NAMES, *RUNS.tolist()]:
+            other.append(row)
+
+    changed_book(tmp_path, change)
+    campaign(tmp_path, "".join(tidy(f'table = "{t}"').replace("runs.*", "runs.xlsx") for t in ("Sheet", "turned")))
+    assert read_campaign(tmp_path).runs["run_id"].tolist() == [
+        f"{t}/runs-{i}" for t in ("Sheet", "turned") for i in (2, 3, 4)
+    ]
+
+
+def test_a_library_that_is_not_installed_is_named_with_its_extra(tmp_path, monkeypatch):
+    book(tmp_path, "runs.xlsx", [NAMES, *RUNS.tolist()])
+    monkeypatch.setitem(sys.modules, "python_calamine", None)
+    with pytest.raises(InputError, match=r"ident-submarine\[readers\]"):
+        runs_of(tmp_path, "runs.xlsx")
+
+
+def test_a_packed_workbook_is_refused_as_packed(tmp_path):
+    book(tmp_path, "runs.xlsx", [NAMES, *RUNS.tolist()])
+    (tmp_path / "runs.xlsx.gz").write_bytes(gzip.compress((tmp_path / "runs.xlsx").read_bytes()))
+    with pytest.raises(InputError, match="packed, and for the reader workbook"):
+        runs_of(tmp_path, "runs.xlsx.gz")
