@@ -18,6 +18,8 @@ INERTIA = {
 }
 TURN = ROWS.replace("rel_sigma,X", "r_radps,rel_sigma,X").replace(",25,0.05", ",25,0.01,0.05")
 TURNING = {"source.0.constants": {**DRIFT["constants"], "test": "rotating_arm"}}
+PIVOT = {"motion_point": {"x_m": 1.0, "y_m": 0.5, "z_m": 0.5, "about": "pivot"}}
+PIVOTED = {**TURNING, **PIVOT}
 TARE = {"tare": [{"what": "strut", "source": "towed alone", "loads": {"X": "90 N"}}]}
 SQUARE = {"tare": [{"what": "strut", "source": "towed alone", "per_speed_squared": {"X": 30.0}}]}
 HALF = {"half_model": {"plane": "port_starboard", "source": "wall"}}
@@ -59,6 +61,7 @@ HEADER_CASES: dict[str, tuple[dict[str, Any], dict[str, Any], dict[str, Any]]] =
     "CampaignFrame.z": ({}, {"frame.z": "up"}, {}),
     "CampaignFrame.angles": ({}, {"frame.angles": "ittc"}, {}),
     "CampaignFrame.axes": ({}, {"frame.axes": "flow"}, {}),
+    "CampaignFrame.moment_axes": ({"frame.axes": "flow"}, {"frame.moment_axes": "body"}, {}),
     "CampaignFrame.rotations": (
         {"frame.z": "up", "frame.rotations": "left-hand"},
         {"frame.rotations": "right-hand"},
@@ -68,6 +71,11 @@ HEADER_CASES: dict[str, tuple[dict[str, Any], dict[str, Any], dict[str, Any]]] =
     "MomentPoint.y_m": ({}, {"moment_point.y_m": 1.0}, {}),
     "MomentPoint.z_m": ({}, {"moment_point.z_m": 1.0}, {}),
     "MomentPoint.about": ({}, {"moment_point.about": "other"}, {"words": True}),
+    "CampaignFile.motion_point": (TURNING, PIVOT, {"files": TURN}),
+    "MotionPoint.x_m": (PIVOTED, {"motion_point.x_m": 3.0}, {"files": TURN}),
+    "MotionPoint.y_m": (PIVOTED, {"motion_point.y_m": 9.0}, {"files": TURN}),
+    "MotionPoint.z_m": (PIVOTED, {"motion_point.z_m": 3.0}, {"files": TURN.replace("r_radps", "q_radps")}),
+    "MotionPoint.about": (PIVOTED, {"motion_point.about": "other"}, {"files": TURN, "words": True}),
     "Scale.ratio": ({}, {"scale.ratio": 2.0}, {}),
     "Scale.length_m": ({}, {"scale.length_m": 60.0}, {}),
     "Fluid.density_kgpm3": ({}, {"fluid.density_kgpm3": 1000.0}, {}),

@@ -59,6 +59,7 @@ SOURCE_CASES: dict[str, tuple[dict[str, Any], dict[str, Any], dict[str, Any]]] =
     "Source.vehicle_origin": (of(DRIFT), of(DRIFT, vehicle_origin=[1.0, 0.0, 0.0]), {}),
     "Source.cofr": (of(DRIFT), of(DRIFT, cofr=[1.0, 0.0, 0.0]), {}),
     "Source.axes": (of(DRIFT), of(DRIFT, axes="flow"), {}),
+    "Source.moment_axes": (of(DRIFT, axes="flow"), of(DRIFT, axes="flow", moment_axes="body"), {}),
     "Source.moments_about": (of(SWAY), of(SWAY, moments_about="fixed"), {"files": {"sway.csv": sway()}}),
     "Source.factor": (of(DRIFT), of(DRIFT, factor={"Y": -1.0}), {}),
     "Source.missing": (of(DRIFT), of(DRIFT, missing=[-629000.0]), {}),

@@ -11,12 +11,15 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from made_campaigns import campaign
 from rewritten_campaigns import BB2, assert_same, header, number, rewritten, text
 
 from ident.captive.campaign import read_campaign
+from ident.checks.check import check_campaign
 from ident.database.store import database_rows
 from ident.identification.identify import identify
 from sim.boat.catalogue import term
+from sim.files.errors import InputError
 
 FORCES, MOMENTS = ("X", "Y", "Z"), ("K", "M", "N")
 
@@ -128,6 +131,65 @@ def test_moment_point_is_scaled_with_the_model(tables, rows, tmp_path):
     model = header().replace("ratio = 1.0", f"ratio = {scale}").replace("length_m = 70.2", f"length_m = {70.2 / scale}")
     model = model.replace("x_m = 0.0", f"x_m = {x}")
     assert_same(rewritten(tmp_path / "c", other, model), rows, 1e-9)
+
+
+@pytest.mark.parametrize("scale", [1.0, 18.348])
+def test_motions_of_another_point_are_those_of_the_origin(tmp_path, scale):
+    """v_P = v_O + omega x r_P by hand, on an arm and in yaw: the run table is that of a campaign about the origin."""
+    point, speed, rate, turning = (1.2, -0.3, 0.4), 3.0, 0.1, 0.02
+    own = {"U": speed, "alpha": 2.0, "beta": -4.0, "p": 0.0, "q": 0.03, "r": rate, "vdot": 0.05, "rdot": turning}
+    a, b = math.radians(own["alpha"]), math.radians(own["beta"])
+    velocity = speed * np.array([math.cos(a) * math.cos(b), math.sin(b), math.sin(a) * math.cos(b)])
+    u, v, w = velocity + np.cross([own["p"], own["q"], own["r"]], point)
+    along, across, down = np.array([0.0, own["vdot"], 0.0]) + np.cross([0.0, 0.0, turning], point)
+    there = {"U": math.sqrt(u * u + v * v + w * w), "alpha": math.degrees(math.atan2(w, u))}
+    there["beta"] = math.degrees(math.asin(v / there["U"]))
+    states = {
+        "arm": ("rotating_arm", ("U_mps", "alpha_deg", "beta_deg", "q_radps", "r_radps")),
+        "yaw": ("acceleration", ("U_mps", "vdot_mps2", "rdot_radps2", "udot_mps2")),
+    }
+    point_table = f"x_m = {point[0]}\ny_m = {point[1]}\nz_m = {point[2]}\nabout = 'pivot'\n"
+    lengths = f"ratio = {scale}\nlength_m = {70.2 / scale!r}"
+    for name, (test, columns) in states.items():
+        values = {c: {**own, "udot": 0.0}[c.split("_")[0]] for c in columns}
+        moved = values | {c: there[c.split("_")[0]] for c in columns[:3] if name == "arm"}
+        moved |= {"vdot_mps2": across, "udot_mps2": along} if name == "yaw" else {}
+        read = []
+        for kind, row in (("origin", values), ("point", moved)):
+            extra = f"[motion_point]\n{point_table}" if kind == "point" else ""
+            constants = f'[source.constants]\ntest = "{test}"\npart = "hull"\nquality = "ok"\nD0 = "25 m"\n'
+            folder = tmp_path / name / kind
+            campaign(folder, f'{extra}[[source]]\nfiles = "a.csv"\n{constants}rel_sigma = 0.02\n', scale=lengths)
+            row = {"run_id": "a", **row, "X_N": -9e4, "Y_N": 2e5, "Z_N": 1e4, "K_Nm": 1e4, "M_Nm": 1e5, "N_Nm": 1e6}
+            pd.DataFrame([row]).to_csv(folder / "a.csv", index=False)
+            read.append(read_campaign(folder).runs.iloc[0])
+        assert down == 0.0
+        for quantity in ("U", "alpha", "beta", "p", "q", "r", "udot", "vdot", "wdot", "rdot", "Y", "N"):
+            one, two = (0.0 if pd.isna(run[quantity]) else float(run[quantity]) for run in read)
+            assert two == pytest.approx(one, rel=1e-12, abs=1e-12), quantity
+
+
+def test_a_motion_point_is_asked_for_where_turning_runs_have_moments_elsewhere(tmp_path):
+    """Moments half a metre ahead of the origin on an arm of 15 m: 2 deg of drift. All zero is an answer too."""
+    point = "x_m = 0.5\ny_m = 0.0\nz_m = 0.0\nabout = 'balance'"
+    constants = '[source.constants]\ntest = "rotating_arm"\npart = "hull"\nquality = "ok"\nD0 = "25 m"\n'
+    runs = "run_id,U_mps,alpha_deg,beta_deg,r_radps,X_N,Y_N,N_Nm\na,3.0,0,2,0.2,-9e4,2e5,1e6\n"
+    still = runs.replace(",r_radps", "").replace(",0.2,", ",")
+    said = f"[motion_point]\n{point.replace('0.5', '0.0')}\n"
+    source = f'[[source]]\nfiles = "a.csv"\n{constants}rel_sigma = 0.02\n'
+    cases = {"silent": ("", source, runs), "said": (said, source, runs)}
+    cases["straight"] = ("", source.replace("rotating_arm", "drift_horizontal"), still)
+    asked = {}
+    for name, (extra, text_, rows_) in cases.items():
+        campaign(tmp_path / name, extra + text_, moment_point=point)
+        (tmp_path / name / "a.csv").write_text(rows_, "utf-8")
+        found = check_campaign(read_campaign(tmp_path / name), tmp_path / name)
+        asked[name] = [f.columns for f in found if f.check == "moment_point"]
+    assert asked == {"silent": [("motion_point",)], "said": [], "straight": []}
+    campaign(tmp_path / "idle", said + cases["straight"][1], moment_point=point)
+    (tmp_path / "idle" / "a.csv").write_text(still, "utf-8")
+    with pytest.raises(InputError, match="key motion_point: declared, and no run turns"):
+        read_campaign(tmp_path / "idle")
 
 
 def test_order_of_files_and_rows_does_not_matter(rows, tables, tmp_path):

@@ -8,8 +8,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 import pytest
-from cases_of_campaign_keys import HEADER_CASES, YAW
-from declared_campaigns import ROWS, campaign, differs, primes, set_at
+from cases_of_campaign_keys import HEADER_CASES, INERTIA, PIVOT, TARE, YAW
+from declared_campaigns import ROWS, campaign, differs, outcome, primes, set_at
 from rewritten_campaigns import BB2
 
 from ident.captive.campaign import read_campaign
@@ -29,6 +29,33 @@ def test_every_key_of_a_campaign_counts(tmp_path, key):
     differs(
         tmp_path, campaign(base), after, files, words=how.get("words", False), named=key, elsewhere=how.get("said", "")
     )
+
+
+# Statements on loads, which published coefficients are none.
+OF_LOADS = {
+    "half_model": {"half_model": {"plane": "port_starboard", "source": "wall"}},
+    "hydrostatics": {
+        "hydrostatics": {"force_n": 9.0, "centre_m": [0.0, 0.0, 0.0], "attitude": "level", "source": "volume"}
+    },
+    "inertia": {**INERTIA, "inertia.source": "weighed"},
+    "frame.axes": {"frame.axes": "flow"},
+    "frame.moment_axes": {"frame.moment_axes": "body"},
+    "motion_point": PIVOT,
+    "tare": TARE,
+}
+
+
+@pytest.mark.parametrize("key", OF_LOADS)
+def test_what_is_said_of_loads_is_refused_where_there_are_none(tmp_path, key):
+    """A campaign of published coefficients alone: it would change nothing."""
+    files = {"drift.csv": "run_id,coefficient,value,rel_sigma\na,Y_v,-0.03,0.1\nb,N_v,-0.013,0.1\n"}
+    constants = {"test": "published_derivative", "part": "hull", "quality": "ok", "source": "report"}
+    before = campaign({"vehicle": "suboff", "scale.length_m": 4.356}, constants=constants)
+    assert "refused" not in outcome(tmp_path / "before", before, files)
+    after = before
+    for path, value in OF_LOADS[key].items():
+        after = set_at(after, path, value)
+    assert f"key {key}" in outcome(tmp_path / "after", after, files)["refused"]
 
 
 def test_a_draught_counts_by_its_normalisation(tmp_path):

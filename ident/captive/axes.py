@@ -6,7 +6,6 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from sim.boat.catalogue import OUTPUTS
 from sim.files.errors import InputError
 
 Array = NDArray[np.float64]
@@ -40,14 +39,13 @@ def turned_by(motion: str, angle: Array) -> Array:
     return turns
 
 
-def to_body(runs: pd.DataFrame, chosen: pd.Series, flow: pd.Series) -> pd.DataFrame:
+def to_body(runs: pd.DataFrame, forces: pd.Series, moments: pd.Series) -> pd.DataFrame:
     """Loads of some runs turned from the axes of flow or tank to the body's.
 
     Parameters
     ----------
     runs : Program frame and sense of angles; every load and its standard error ``s_X``.
-    chosen : (runs,) those whose loads are not along the body's axes.
-    flow : (runs,) True where they are along the flow, for the message.
+    forces, moments : (runs,) What they are along: ``body``, ``flow`` or ``tank``.
 
     Raises
     ------
@@ -55,39 +53,39 @@ def to_body(runs: pd.DataFrame, chosen: pd.Series, flow: pd.Series) -> pd.DataFr
         For a run whose turned load needs one that is not measured, or a turned load that is excluded in part.
     """
     out = runs.copy()
-    if not chosen.any():
-        return out
-    rows = runs.index[chosen]
-    alpha, beta = (runs.loc[rows, k].fillna(0.0).to_numpy(float) for k in ("alpha", "beta"))
-    matrix = from_flow(alpha, beta)
-    for group in GROUPS:
-        values = runs.loc[rows, list(group)].to_numpy(float)
-        whole = np.zeros_like(values)
-        for i, load in enumerate(group):
-            for j, other in enumerate(group):
-                share = np.where(np.abs(matrix[:, i, j]) > _NOTHING, matrix[:, i, j], 0.0)
-                lost = (share != 0.0) & np.isnan(values[:, j]) & ~np.isnan(values[:, i])
-                if lost.any():
-                    run = runs.loc[rows[int(np.flatnonzero(lost)[0])]]
-                    words = "flow" if flow.loc[run.name] else "tank"
-                    text = f"a number: {load} along the body's axes needs {other} along those of the {words}"
-                    raise InputError(f"{run['file']}, row {run['row']}, column {other}", "nothing", text)
-                whole[:, i] += np.where(share == 0.0, 0.0, share * np.nan_to_num(values[:, j]))
-        out.loc[rows, list(group)] = np.where(np.isnan(values), np.nan, whole)
-        errors = [f"s_{o}" for o in group]
-        if all(error in runs for error in errors):
-            squares = np.nan_to_num(runs.loc[rows, errors].to_numpy(float)) ** 2
-            carried = np.sqrt(np.einsum("nij,nj->ni", matrix**2, squares))
-            out.loc[rows, errors] = np.where(runs.loc[rows, errors].isna().to_numpy(), np.nan, carried)
-    for name in out.loc[rows, "exclude"].unique():
-        excluded = [w for w in str(name).split() if w in OUTPUTS]
-        for group in GROUPS:
-            some = [w for w in excluded if w in group]
-            if some and len(some) < len(group) and _mixed(matrix[(out.loc[rows, "exclude"] == name).to_numpy()]):
-                run = out[out["exclude"] == name].iloc[0]
-                text = f"{' '.join(group)} together, or none: a turned load is made of all of them"
-                raise InputError(f"{run['file']}, row {run['row']}, column exclude", repr(name), text)
+    for group, along in zip(GROUPS, (forces, moments), strict=True):
+        for words in ("flow", "tank"):
+            if (along == words).any():
+                _turn_group(out, runs.index[along == words], group, words)
     return out
+
+
+def _turn_group(out: pd.DataFrame, rows: pd.Index, group: tuple[str, str, str], words: str) -> None:
+    """Turn forces or moments of some rows in place."""
+    matrix = from_flow(*(out.loc[rows, k].fillna(0.0).to_numpy(float) for k in ("alpha", "beta")))
+    values = out.loc[rows, list(group)].to_numpy(float)
+    whole = np.zeros_like(values)
+    for i, load in enumerate(group):
+        for j, other in enumerate(group):
+            share = np.where(np.abs(matrix[:, i, j]) > _NOTHING, matrix[:, i, j], 0.0)
+            lost = (share != 0.0) & np.isnan(values[:, j]) & ~np.isnan(values[:, i])
+            if lost.any():
+                run = out.loc[rows[int(np.flatnonzero(lost)[0])]]
+                text = f"a number: {load} along the body's axes needs {other} along those of the {words}"
+                raise InputError(f"{run['file']}, row {run['row']}, column {other}", "nothing", text)
+            whole[:, i] += np.where(share == 0.0, 0.0, share * np.nan_to_num(values[:, j]))
+    out.loc[rows, list(group)] = np.where(np.isnan(values), np.nan, whole)
+    errors = [f"s_{o}" for o in group]
+    if all(error in out for error in errors):
+        squares = np.nan_to_num(out.loc[rows, errors].to_numpy(float)) ** 2
+        carried = np.sqrt(np.einsum("nij,nj->ni", matrix**2, squares))
+        out.loc[rows, errors] = np.where(out.loc[rows, errors].isna().to_numpy(), np.nan, carried)
+    for name in out.loc[rows, "exclude"].unique():
+        some = [w for w in str(name).split() if w in group]
+        if some and len(some) < len(group) and _mixed(matrix[(out.loc[rows, "exclude"] == name).to_numpy()]):
+            run = out.loc[rows][out.loc[rows, "exclude"] == name].iloc[0]
+            text = f"{' '.join(group)} together, or none: a turned load is made of all of them"
+            raise InputError(f"{run['file']}, row {run['row']}, column exclude", repr(name), text)
 
 
 def _mixed(matrix: Array) -> bool:

@@ -25,11 +25,13 @@ from ident.captive.channels import NotRising
 from ident.captive.complete import check_complete, check_parts, check_words
 from ident.captive.conversions import (
     arm_rates,
+    at_origin,
     deflected_left_out,
     move_moments,
     standard_errors,
     to_full_scale,
     turn,
+    turning,
     whole_model,
 )
 from ident.captive.histories import Reduced
@@ -291,19 +293,38 @@ def _check_used(header: CampaignFile, runs: pd.DataFrame, where: str) -> None:
             raise InputError(f"{where}, key tare.{k}", "no load", "loads or per_speed_squared: nothing is taken off")
     tables = [("inertia", header.inertia.parts)] if header.inertia.model_inertia_in_loads else []
     tables += [("hydrostatics", header.hydrostatics.parts)] if header.hydrostatics else []
+    with_loads = runs[runs[list(OUTPUTS)].notna().any(axis=1)]
     for name, parts in tables:
         for part in parts:
-            if not (runs["part"] == part).any():
+            if not (with_loads["part"] == part).any():
                 raise InputError(f"{where}, key {name}.parts", f"{part!r}, and no run of it", "parts of the runs")
+    if header.half_model is not None and with_loads.empty:
+        raise InputError(f"{where}, key half_model", "declared, and no run has loads", "nothing")
+    _check_axes_used(header, runs, with_loads, where)
+
+
+def _check_axes_used(header: CampaignFile, runs: pd.DataFrame, with_loads: pd.DataFrame, where: str) -> None:
+    """Axes of loads and a motion point have runs that they change."""
+    for key in ("axes", "moment_axes"):
+        stated = getattr(header.frame, key)
+        if stated not in ("", "body") and with_loads.empty:
+            raise InputError(f"{where}, key frame.{key}", f"{stated!r}, and no run has loads", "nothing")
+    if header.frame.moment_axes and with_loads[[*"KMN"]].isna().all(axis=None):
+        raise InputError(f"{where}, key frame.moment_axes", "declared, and no run has a moment", "nothing")
+    if header.motion_point is not None and not turning(runs).any():
+        raise InputError(f"{where}, key motion_point", "declared, and no run turns", "nothing")
 
 
 def _in_program_frame(runs: pd.DataFrame, header: CampaignFile, frame: Frame, where: str) -> pd.DataFrame:
     """Every conversion, in the order of ``ident.captive.conversions``."""
     ratio, point = header.scale.ratio, header.moment_point
     runs = turn(without_tare(runs, header.tare, where), frame, header.frame.angles)
-    runs = to_body(runs, runs["axes"] != "body", runs["axes"] == "flow")
+    runs = to_body(runs, runs["axes"], runs["moment_axes"])
     runs = move_moments(runs, frame.vector([point.x_m, point.y_m, point.z_m]))
     runs = without_hydrostatics(runs, header, frame)
+    if header.motion_point is not None:
+        moved = header.motion_point
+        runs = at_origin(runs, frame.vector([moved.x_m, moved.y_m, moved.z_m]))
     runs = whole_model(without_inertia(runs, header, frame), header)
     return standard_errors(to_full_scale(runs, ratio), header, ratio * header.scale.length_m)
 

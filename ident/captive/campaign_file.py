@@ -27,12 +27,15 @@ class CampaignFrame(FrameData):
         own velocity, so that minus x is drag; y and z turned with it (drag, side force and lift). ``tank``:
         axes of the tank or mesh, x along the towing direction, in which the body stands at its
         angles, or swings in an oscillation of yaw, pitch or roll. Directions are those of a body at zero angles.
+    moment_axes : What the moments are along, where it is not what the forces are: a solver gives drag and lift
+        along the flow, and moments along its mesh.
     rotations : Sense of moments and rates about their axis, ``right-hand`` or ``left-hand``
         (N = x Y - y X in left-handed axes). A left-handed set has to state it.
     """
 
     angles: Literal["flight", "ittc"]
     axes: Literal["body", "flow", "tank"] = "body"
+    moment_axes: Literal["", "body", "flow", "tank"] = ""
     rotations: Literal["", "right-hand", "left-hand"] = ""
 
     @property
@@ -64,6 +67,20 @@ class MomentPoint(Data):
     y_m: float
     z_m: float
     about: str
+
+
+class MotionPoint(MomentPoint):
+    """Point whose speed, drift and incidence the runs state, from the vehicle's origin, in the campaign frame.
+
+    A boat that turns has another velocity at each of its points: v = v_P - omega x r_P at the origin.
+
+    Attributes
+    ----------
+    x_m : Along x [m].
+    y_m : Along y [m].
+    z_m : Along z [m].
+    about : What the point is, in words: the pivot of the arm or of the planar motion mechanism.
+    """
 
 
 class Scale(Data):
@@ -317,6 +334,7 @@ class CampaignFile(Data):
     provenance : Where the runs come from.
     frame : Axes of loads and rates, and sign of the angles.
     moment_point : Point the moments are about.
+    motion_point : Point of a turning boat whose speed, drift and incidence are stated; the vehicle's origin without.
     scale : Ship over model, and the tested length.
     fluid : Density of the water.
     inertia : Whether the loads contain the model's own inertia.
@@ -346,6 +364,7 @@ class CampaignFile(Data):
     inertia: Inertia
     uncertainty: Uncertainty
     quality: dict[str, Quality]
+    motion_point: MotionPoint | None = None
     tare: list[Tare] = Field(default_factory=list)
     half_model: HalfModel | None = None
     hydrostatics: Hydrostatics | None = None

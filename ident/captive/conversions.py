@@ -18,7 +18,8 @@ from ident.captive.oscillation import PHASES
 from ident.captive.other_loads import as_measured
 from ident.captive.quantities import TAKEN
 from ident.captive.run_table import DIRECT, MOTION, excluded
-from sim.boat.catalogue import OUTPUTS
+from sim.boat.catalogue import ACCELERATIONS, OUTPUTS
+from sim.boat.forces import body_velocity
 from sim.boat.vehicle import Vehicle
 from sim.files.errors import InputError
 from sim.files.frames import Frame
@@ -127,6 +128,54 @@ def move_moments(runs: pd.DataFrame, point: list[float]) -> pd.DataFrame:
             if f"s_{moment}" in moved and f"s_{force}" in moved:
                 error, carried = moved[f"s_{moment}"], arm * runs[f"s_{force}"].fillna(0.0)
                 moved[f"s_{moment}"] = (error**2 + carried**2) ** 0.5
+    return moved
+
+
+def turning(runs: pd.DataFrame) -> pd.Series:
+    """Runs whose points move differently: with a rate, a radius or an angular acceleration."""
+    moved = [c for c in ("p", "q", "r", "pdot", "qdot", "rdot", "R0") if c in runs]
+    return runs[moved].fillna(0.0).ne(0.0).any(axis=1)
+
+
+def at_origin(runs: pd.DataFrame, point: list[float]) -> pd.DataFrame:
+    """Speed, angles and accelerations of turning runs at the vehicle's origin, from those of a point of the boat.
+
+    v_O = v_P - omega x r_P, of the velocity's components in the body and of their rates of change alike
+    (Fossen 2011, Eq. (2.21): the point is fixed in the body). Runs that do not turn stay as they are.
+
+    Parameters
+    ----------
+    runs : Program frame, model scale.
+    point : r_P from the vehicle's origin [m].
+
+    Raises
+    ------
+    InputError
+        For a pure rotation, which is one about the origin.
+    """
+    moved = runs.copy()
+    rows = runs.index[turning(runs)]
+    if not any(point) or not len(rows):
+        return moved
+    still = runs.loc[rows][~(runs.loc[rows, "U"].fillna(0.0) > 0.0)]
+    if len(still):
+        run = still.iloc[0]
+        text = "pure rotation about the vehicle's origin: about another point the origin moves through the water"
+        raise InputError(f"{run['file']}, row {run['row']}, column U", "no speed, and a motion point", text)
+    state = runs.loc[rows, ["U", "alpha", "beta"]].fillna(0.0).to_numpy(float)
+    velocity = np.array([body_velocity(*row) for row in state])
+    rates, angular = (runs.loc[rows, list(k)].fillna(0.0).to_numpy(float) for k in (MOTION[:3], ACCELERATIONS[3:]))
+    u, v, w = (velocity - np.cross(rates, np.broadcast_to(point, rates.shape))).T
+    speed = np.sqrt(u**2 + v**2 + w**2)
+    moved.loc[rows, "U"] = speed
+    for name, angle in (("alpha", np.arctan2(w, u)), ("beta", np.arcsin(np.clip(v / speed, -1.0, 1.0)))):
+        before = runs.loc[rows, name].to_numpy(float)
+        # An angle that nobody stated stays unstated where it is zero.
+        moved.loc[rows, name] = np.where(np.isnan(before) & (np.abs(angle) < _AMIDSHIPS), before, angle)
+    change = np.cross(angular, np.broadcast_to(point, angular.shape))
+    for name, one in zip(ACCELERATIONS[:3], change.T, strict=True):
+        before = runs.loc[rows, name]
+        moved.loc[rows, name] = (before.fillna(0.0) - one).where(before.notna() | (one != 0.0))
     return moved
 
 

@@ -12,6 +12,7 @@ A steady oscillation does not: a lag turns velocity into acceleration, as anothe
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -33,6 +34,11 @@ _STEP = 0.02
 # Samples that are looked at, after averaging neighbours; fewest in a period.
 _MOST = 4096
 _PER_PERIOD = 12
+# Width of the filter of both, in periods: a bell's standard deviation.
+_SMOOTH = 1.0 / 24.0
+# The same of the filter that parts motion from noise: half of a motion of twice the frequency passes, and has to.
+_SLOW = 1.0 / 16.0
+_SHARE = 0.3
 # Steps that differ by more than this factor are no clock that a spline is laid through.
 _UNEVEN = 5.0
 # A lag is seen when its standard error is below this share of a period, and no other lag fits as well by so
@@ -85,9 +91,13 @@ def of_loads(
     from scipy.interpolate import CubicSpline
     from scipy.optimize import minimize_scalar
 
-    moved = CubicSpline(t, _means(values[:, names.index("displacement")], step, n))
+    displacement = _means(values[:, names.index("displacement")], step, n)
+    if not _more_than_a_line(t, displacement, frequency):
+        return None
+    smooth = _smoothing(t, _SMOOTH * period)
+    moved = CubicSpline(t, smooth(displacement))
     root = np.sqrt(w[inside] / w[inside].mean())
-    y = np.stack([_means(values[:, names.index(o)], step, n)[inside] * root for o in loads], axis=1)
+    y = np.stack([smooth(_means(values[:, names.index(o)], step, n))[inside] * root for o in loads], axis=1)
     early = [t[inside] - stated.get(o, 0.0) + stated.get("displacement", 0.0) for o in loads]
 
     def residuals(tau: float) -> Array:
@@ -115,6 +125,38 @@ def of_loads(
     others = (rests / noise).sum(axis=1)[np.abs(grid - tau) > 2.0 * _STEP * period] - left(tau)
     alone = bool((others > _SURE**2 * correlated).all())
     return Delay(f"the loads {' '.join(loads)}", tau, error) if alone and error < _SEEN * period else None
+
+
+def _smoothing(t: Array, width: float) -> Callable[[Array], Array]:
+    """A low-pass filter, the same for motion and loads: their relation stays, and noise has small derivatives.
+
+    Parameters
+    ----------
+    t : (n,) [s].
+    width : Standard deviation of its bell [s].
+    """
+    # Few records need it, and it is slow to load.
+    from scipy.ndimage import gaussian_filter1d
+
+    samples = width / float(np.median(np.diff(t)))
+    return lambda x: np.asarray(gaussian_filter1d(x, samples, mode="nearest"), dtype=float)
+
+
+def _more_than_a_line(t: Array, displacement: Array, frequency: float) -> bool:
+    """Whether what a motion is beside its line is slow, as a motion is, and no noise.
+
+    With a line and noise any lag fits, and the best one is that whose load has least of the noise of the acceleration.
+    """
+    at = 2.0 * math.pi * frequency * np.outer(t, (1.0, 2.0, 3.0))
+    x = np.column_stack([np.ones(t.size), np.sin(at), np.cos(at)])
+    rest = displacement - x @ np.linalg.lstsq(x, displacement, rcond=None)[0]
+    if not float(rest.var()) > 0.0:
+        return False
+    width = _SLOW / frequency
+    share = float(_smoothing(t, width)(rest).var() / rest.var())
+    # What the filter leaves of white noise.
+    white = float(np.median(np.diff(t))) / (2.0 * math.sqrt(math.pi) * width)
+    return share > max(_SHARE, 1.5 * white)
 
 
 def _even(apart: Array, longest: float) -> bool:

@@ -183,7 +183,9 @@ def reduce(channels: Channels, rule: Reduction, run_id: str, frequency: float | 
     )
     if rule.kind == "oscillatory":
         values, delays = _harmonic_values(names, fit, frequency or 0.0, rule)
-        whole = condense.condense(_moved(sound(None), channels, names, rule, frequency), condense.constant, len(names))
+        # A motion that starts from rest shows a lag by its start.
+        all_of_it = faults.faults(timed(channels, rule), "displacement")
+        whole = condense.condense(_moved(all_of_it, channels, names, rule, frequency), condense.constant, len(names))
         weight, time, _, samples = whole.blocks()
         seen = delay.of_loads(time, samples, weight, names, frequency or 0.0, rule.delay_s)
         return values, replace(reduced, delays=(*delays, *((seen,) if seen else ())))

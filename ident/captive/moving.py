@@ -26,6 +26,11 @@ def axes_of(source: Source, header: CampaignFile) -> str:
     return source.axes or header.frame.axes
 
 
+def moment_axes_of(source: Source, header: CampaignFile) -> str:
+    """What the moments of a source are along, which is what its forces are along unless it is stated."""
+    return source.moment_axes or ("" if source.axes else header.frame.moment_axes) or axes_of(source, header)
+
+
 @dataclass(frozen=True)
 class _Turn:
     """Loads of an oscillation to the body's axes and its own moment point, sample by sample.
@@ -110,6 +115,7 @@ def moving_body(
     if rule.kind != "oscillatory":
         return None
     assert rule.motion is not None
+    refuse_two_sets(source, header, where)
     if axes == "flow":
         text = "tank or body: the flow itself turns in an oscillation"
         raise InputError(f"{where}, key axes", "'flow' for an oscillation", text)
@@ -167,6 +173,20 @@ def _measured(moved: Moving, names: list[str], at: dict[str, int], where: str) -
         raise InputError(f"{where}, key source.axes or source.moments_about", f"no {' '.join(others)}", text)
 
 
+def refuse_two_sets(source: Source, header: CampaignFile, where: str) -> None:
+    """Refuse forces along one set of axes and moments along another in an oscillation.
+
+    Raises
+    ------
+    InputError
+        Naming the key.
+    """
+    forces, moments = axes_of(source, header), moment_axes_of(source, header)
+    if moments != forces:
+        text = f"{forces!r}: moments of an oscillation are along the axes of its forces"
+        raise InputError(f"{where}, key moment_axes", repr(moments), text)
+
+
 def refuse_tables(source: Source, header: CampaignFile, angles: bool, where: str) -> None:
     """Harmonics in a table cannot be turned after the fact, but where nothing turns.
 
@@ -176,7 +196,10 @@ def refuse_tables(source: Source, header: CampaignFile, angles: bool, where: str
         For loads along flow or tank in an oscillation that turns the body, or at an angle.
     """
     axes = axes_of(source, header)
-    if source.reduction is None or axes == "body":
+    if source.reduction is None:
+        return
+    refuse_two_sets(source, header, where)
+    if axes == "body":
         return
     turns = source.reduction.motion not in _ALONG
     if axes == "flow" or turns or angles:

@@ -20,7 +20,7 @@ from ident.captive.grids import with_discretisation
 from ident.captive.harmonic_tables import cartesian, instants
 from ident.captive.histories import Reduced, reduce
 from ident.captive.left_behind import left_behind
-from ident.captive.moving import axes_of, moving_body, refuse_tables
+from ident.captive.moving import axes_of, moment_axes_of, moving_body, refuse_tables
 from ident.captive.oscillation import states
 from ident.captive.quantities import Column, owner
 from ident.captive.readers.opening import matching, on_coarser_grids, open_sheet, reader_of
@@ -131,7 +131,8 @@ def _read(
         error.file = name
         return pd.DataFrame(), [], error, uses
     turned = source.reduction is not None and source.reduction.kind == "oscillatory"
-    table = table.assign(file=name, files=source.files, axes="body" if turned else axes_of(source, header))
+    along = {"axes": axes_of(source, header), "moment_axes": moment_axes_of(source, header)}
+    table = table.assign(file=name, files=source.files, **(dict.fromkeys(along, "body") if turned else along))
     if source.table:
         # Its runs are numbered by themselves.
         table = table.assign(of_table=source.table)

@@ -223,6 +223,7 @@ class Source(Data):
     vehicle_origin : OpenFOAM: the vehicle's origin in mesh axes [m].
     cofr : OpenFOAM: the point the moments are about, of files whose header does not name it [m].
     axes : Axes of these files' loads, where they are not as ``[frame]`` says: ``body``, ``flow`` or ``tank``.
+    moment_axes : Axes of the moments, where they are not those of the forces.
     moments_about : A point that moves with the ``body`` or stays ``fixed``, where the body moves in its axes.
     factor : Header or quantity -> what its values are multiplied by, where the header does not say it.
     missing : Numbers and words that stand for a value that was not measured: ``-9999``, ``"NaN"``, ``""`` for blanks.
@@ -263,6 +264,7 @@ class Source(Data):
     vehicle_origin: Vector | None = None
     cofr: Vector | None = None
     axes: Literal["", "body", "flow", "tank"] = ""
+    moment_axes: Literal["", "body", "flow", "tank"] = ""
     moments_about: Literal["", "body", "fixed"] = ""
     factor: dict[str, Annotated[float, Field(ge=-1e9, le=1e9)]] = Field(default_factory=dict)
     missing: Annotated[list[float | Annotated[str, Field(max_length=40)]], Field(max_length=20)] = Field(

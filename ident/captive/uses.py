@@ -107,9 +107,12 @@ def refuse_axes_of_published(runs: pd.DataFrame, source: Source, where: str) -> 
     InputError
         Naming the key.
     """
-    if source.axes and len(runs) and (runs["test"] == PUBLISHED).all():
-        text = "nothing: published coefficients are along the axes of [frame]"
-        raise InputError(f"{where}, key source.axes", f"{source.axes!r}, declared and unused", text)
+    for key, stated in (("axes", source.axes), ("moment_axes", source.moment_axes)):
+        if stated and len(runs) and (runs["test"] == PUBLISHED).all():
+            text = "nothing: published coefficients are along the axes of [frame]"
+            raise InputError(f"{where}, key source.{key}", f"{stated!r}, declared and unused", text)
+    if source.moment_axes and len(runs) and not any(o in runs and runs[o].notna().any() for o in "KMN"):
+        raise InputError(f"{where}, key source.moment_axes", "declared, and no run has a moment", "nothing")
 
 
 def base(quantity: str) -> str:

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 import pandas as pd
 
+from ident.captive.axes import from_flow
 from ident.checks.findings import (
     HULL,
     Body,
@@ -25,11 +26,22 @@ from ident.checks.findings import (
 from sim.boat.catalogue import ACCELERATIONS
 
 _PLANES = {"drift_horizontal": ("beta", "Y", "N"), "drift_vertical": ("alpha", "Z", "M")}
+# Rounding of an angle that is none [rad].
+_NO_ANGLE = 1e-6
 _MOVING = ("p", "q", "r", *ACCELERATIONS)
 
 
 def _still(runs: pd.DataFrame) -> pd.Series:
     return (runs[list(_MOVING)].fillna(0.0) == 0.0).all(axis=1) & runs["part"].isin(HULL)
+
+
+def _sweep(runs: pd.DataFrame, test: str, angle: str) -> pd.DataFrame:
+    """Runs over one angle of the flow: without the other where a file sweeps both, else those of its test."""
+    of_test = runs[runs["test"] == test]
+    other = "alpha" if angle == "beta" else "beta"
+    if of_test[other].fillna(0.0).abs().round(6).nunique() < 3:
+        return of_test
+    return of_test[of_test[other].fillna(0.0).abs() < _NO_ANGLE]
 
 
 @check("flow_axes")
@@ -39,7 +51,7 @@ def along_the_flow(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
     if body is None:
         return
     for test, (angle, force, _) in _PLANES.items():
-        runs = evidence.runs[(evidence.runs["test"] == test) & _still(evidence.runs)]
+        runs = _sweep(evidence.runs[_still(evidence.runs)], test, angle)
         runs = runs[kept(runs, "X") & kept(runs, force) & (runs[angle].abs() < math.radians(rule.limits["widest"]))]
         if runs[angle].abs().round(6).nunique() < 3:
             continue
@@ -56,6 +68,29 @@ def along_the_flow(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
         what = f"X changes with {angle} by {slope:.2f} of {force} tan({angle}): as loads {turned}, would"
         file = ", ".join(dict.fromkeys(together(runs)))
         yield rule.finding(file[:200], rows_of(runs), ["X", force], what)
+
+
+@check("flow_axes")
+def moments_along_the_flow(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
+    """Moments that were turned from the flow with the forces, where nothing says that they are along it."""
+    campaign = evidence.campaign
+    if campaign is None or "moment_axes" not in evidence.runs:
+        return
+    stated = {s.files for s in campaign.header.source if s.moment_axes}
+    runs = evidence.runs[(evidence.runs["moment_axes"] == "flow") & ~evidence.runs["files"].isin(stated)]
+    if runs.empty or campaign.header.frame.moment_axes:
+        return
+    turned = from_flow(*(runs[k].fillna(0.0).to_numpy(float) for k in ("alpha", "beta")))
+    moments = np.nan_to_num(runs[[*"KMN"]].to_numpy(float))
+    before = np.einsum("nji,nj->ni", turned, moments)
+    changed, size = np.abs(moments - before).max(axis=0), np.abs(moments).max(axis=0)
+    asked = [c for c in range(3) if changed[c] > rule.limits["asked"] * size[c] > 0.0]
+    if asked:
+        shares = ", ".join(f"{'KMN'[c]} changes by {changed[c] / size[c]:.1%} of its largest" for c in asked)
+        what = f"are moments along the flow too? Nothing says it, and turned with the forces {shares}: solvers give "
+        what += "drag and lift with moments along their mesh; moment_axes in [[source]] says it"
+        file = ", ".join(dict.fromkeys(together(runs)))
+        yield rule.finding(file[:200], rows_of(runs), ["KMN"[c] for c in asked], what, "warning")
 
 
 @check("hydrostatic")

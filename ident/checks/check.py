@@ -104,11 +104,14 @@ def evidence_of(campaign: Campaign, folder: Path | None = None) -> Evidence:
         For a table of ``[tables]`` that is missing or lacks a column.
     """
     particulars, header = campaign.vehicle.particulars, campaign.header
-    mass = particulars.displaced_mass.value
-    x, y, z = (particulars.mass.value * k**2 for k in particulars.radius_of_gyration.value)
+    # In a wind tunnel the body displaces air.
+    limits, density = rules()["fluid"].limits, header.fluid.density_kgpm3
+    thinner = density / limits["water"] if density < limits["air_high"] else 1.0
+    mass = particulars.displaced_mass.value * thinner
+    x, y, z = (particulars.mass.value * thinner * k**2 for k in particulars.radius_of_gyration.value)
     length, scale = particulars.length.value, header.scale
     draught = scale.ratio * scale.draught_m if scale.draught_m else None
-    body = Body(length, header.fluid.density_kgpm3, mass, (x, y, z), draught, f"vehicle {campaign.vehicle.name}")
+    body = Body(length, density, mass, (x, y, z), draught, f"vehicle {campaign.vehicle.name}")
     beside = {k: read_table(folder, v, k) for k, v in header.tables.given().items()} if folder else {}
     return Evidence(
         runs=campaign.runs,

@@ -29,7 +29,7 @@ def of_this_boat(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
         yield rule.finding(file, [], [], str(error).replace("\n", "; "), "error")
         return
     known = vehicle.particulars
-    length, volume = known.length.value, known.displaced_mass.value / body.density
+    length, volume = known.length.value, (body.mass or known.displaced_mass.value) / body.density
     centre, buoyancy = hull.centre, known.centre_of_buoyancy.value[0]
     for name, off, what in (
         ("length", hull.length / length - 1.0, f"lines of {hull.length:.4g} m, the vehicle of {length:.4g} m"),

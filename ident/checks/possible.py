@@ -12,8 +12,9 @@ import numpy as np
 import pandas as pd
 
 from ident.captive.campaign import Campaign
+from ident.captive.conversions import turning
 from ident.captive.run_table import MEASURED
-from ident.checks.findings import Evidence, Finding, Rule, check, factors, kept, rows_of, together
+from ident.checks.findings import Evidence, Finding, Rule, check, factors, kept, rows_of, rules, together
 from sim.boat.catalogue import ACCELERATIONS, SETS, terms
 from sim.boat.parts import vehicle_terms
 
@@ -32,9 +33,15 @@ def states_of_a_boat(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
     for name, most in angles.items():
         size = np.degrees(runs[name]).abs()
         yield from _beyond(runs, rule, name, size, most, "deg")
-    yield from _beyond(runs, rule, "U", runs["U"], limits["speed"], "m/s at full scale")
+    header = evidence.campaign.header if evidence.campaign else None
+    tunnel = header is not None and header.fluid.density_kgpm3 < rules()["fluid"].limits["air_high"]
+    # Full-scale speeds are by Froude's law, which no wind tunnel keeps.
+    own = math.sqrt(header.scale.ratio) if tunnel and header is not None else 1.0
+    fastest, where = (limits["air"], "m/s in the wind tunnel") if tunnel else (limits["speed"], "m/s at full scale")
+    yield from _beyond(runs, rule, "U", runs["U"] / own, fastest, where)
     for name in ("p", "q", "r"):
-        yield from _beyond(runs, rule, name, runs[name].abs() * length, limits["speed"], "m/s at the boat's length")
+        at_length = "m/s at the boat's length" if not tunnel else f"{where}, at the model's length"
+        yield from _beyond(runs, rule, name, runs[name].abs() * length / own, fastest, at_length)
     # A pure rotation has no way on, and a circle of no size; what moves across the hull is on no circle.
     along = runs["U"] * np.cos(runs["alpha"].fillna(0.0)) * np.cos(runs["beta"].fillna(0.0))
     tight = runs[["p", "q", "r"]].abs().max(axis=1) * length / runs["U"].where(along > 0.5 * runs["U"])
@@ -48,7 +55,7 @@ def states_of_a_boat(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
         yield from _beyond(runs, rule, name, runs[name].abs() * lever, limits["acceleration"], "m/s^2")
     vehicle = evidence.vehicle
     if vehicle is not None and vehicle.propeller is not None:
-        tip = math.pi * vehicle.diameter * runs["n"].abs()
+        tip = math.pi * vehicle.diameter * runs["n"].abs() / own
         yield from _beyond(runs, rule, "n", tip, limits["tip"], "m/s at the tip of the propeller's blades")
     yield from _beyond(runs, rule, "D0", runs["D0"], limits["depth"], "m of depth")
     yield from _beyond(runs, rule, "t", runs["t"].abs(), limits["fraction"], "of the thrust")
@@ -111,6 +118,27 @@ def point_beside_the_body(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
         if abs(value) > most * length:
             what = f"{axis} = {value:g} of a body of {length:g} m: no balance and no mesh has its point there"
             yield rule.finding("campaign.toml", [], [f"moment_point.{axis}"], what)
+
+
+@check("moment_point")
+def motions_of_another_point(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
+    """Turning runs of a campaign whose moments are about another point than the origin: whose motions are stated?"""
+    campaign = evidence.campaign
+    if campaign is None or campaign.header.motion_point is not None:
+        return
+    header = campaign.header
+    x, y, z = header.frame.frame.vector([getattr(header.moment_point, f"{k}_m") * header.scale.ratio for k in "xyz"])
+    runs = evidence.runs[turning(evidence.runs) & (evidence.runs["U"] > 0.0)]
+    p, q, r = (runs[k].fillna(0.0) for k in "pqr")
+    across = np.hypot(r * x - p * z, p * y - q * x) / runs["U"]
+    asked = runs[across > rule.limits["turned"]]
+    for file, group in asked.groupby(together(asked), sort=False):
+        worst = math.degrees(across[group.index].max())
+        what = f"{len(group)} turning runs, and moments about another point than the vehicle's origin: speed and drift "
+        what += (
+            f"are taken for those of the origin; were they the moment point's, it would drift by {worst:.2g} deg more"
+        )
+        yield rule.finding(str(file), rows_of(group), ["motion_point"], what, "warning")
 
 
 @check("errors")

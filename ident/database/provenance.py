@@ -20,6 +20,7 @@ _TURNED = (*OUTPUTS, *MOTION)
 _STATED = (
     "table",
     "axes",
+    "moment_axes",
     "moments_about",
     "factor",
     "missing",
@@ -71,7 +72,7 @@ def conversions(campaign: Campaign) -> dict[str, Any]:
         ],
         "histories": [{"run_id": r.run_id, "file": r.file, "reduction": r.words()} for r in campaign.reduced],
         "tare": tares,
-        "frame": data["frame"]
+        "frame": {k: v for k, v in data["frame"].items() if k != "moment_axes" or v}
         | {
             "rotations": frame.rotations or SENSES[0],
             "to": str(PROGRAM),
@@ -79,6 +80,7 @@ def conversions(campaign: Campaign) -> dict[str, Any]:
             "beta_changed_sign": header.frame.angles == "ittc",
         },
         "moment_point": data["moment_point"],
+        **({"motion_point": data["motion_point"]} if data["motion_point"] else {}),
         "inertia": inertia,
         "half_model": data["half_model"],
         **({"hydrostatics": data["hydrostatics"]} if data["hydrostatics"] else {}),
@@ -153,6 +155,7 @@ def steps(stored: dict[str, Any]) -> list[tuple[str, str]]:
         ("Tare", _tare(stored["tare"])),
         *_frame(stored["frame"]),
         ("Moments", _moments(stored["moment_point"])),
+        *_motions(stored.get("motion_point")),
         ("Model's own inertia", _inertia(stored["inertia"])),
         ("Half model", _half(stored["half_model"])),
         *_hydrostatics(stored.get("hydrostatics")),
@@ -223,6 +226,7 @@ def _frame(frame: dict[str, Any]) -> list[tuple[str, str]]:
         ("Rotations", f"{frame['rotations']} about these axes"),
         ("Angles", angles[frame["angles"]]),
         *([("Loads along", f"the {frame['axes']}, turned to the body")] if frame.get("axes", "body") != "body" else []),
+        *([("Moments along", f"the {frame['moment_axes']}")] if frame.get("moment_axes") else []),
     ]
 
 
@@ -231,6 +235,13 @@ def _moments(point: dict[str, Any]) -> str:
     shown = ", ".join(f"{x:g}" for x in place)
     moved = f"moved to the vehicle's origin from ({shown}) m" if any(place) else "about the vehicle's origin: not moved"
     return f"{moved}; {point['about']}"
+
+
+def _motions(point: dict[str, Any] | None) -> list[tuple[str, str]]:
+    if point is None:
+        return []
+    shown = ", ".join(f"{point[k]:g}" for k in ("x_m", "y_m", "z_m"))
+    return [("Motions", f"of turning runs taken to the vehicle's origin from ({shown}) m; {point['about']}")]
 
 
 def _inertia(inertia: dict[str, Any]) -> str:

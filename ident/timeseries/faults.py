@@ -7,7 +7,7 @@ of its channels, and counted by channel and kind; nothing is put in its place.
 * **sentinel**: a stated value or word (``missing``), one written with nines only (-999, 9999, ...) or the end of
   an integer's range far outside of all others, or one value that stands often and far from all others: what
   loggers write where they have nothing.
-* **spike**: at most three samples far outside of 98 % of the record, with neighbours inside on both
+* **spike**: at most three samples far outside of 98 % of the record (or of 90 %), with neighbours inside on both
   sides. What stands at the start of a record is the start-up transient's, and not looked at.
 * **stuck**: one value for longer than chance repeats it, while the steps around it are larger than
   the last digit: a frozen channel, an amplifier at its limit, a dropout to zero. A computed load
@@ -35,6 +35,9 @@ _CARRIED = 64
 # A spike is outside of the quantiles by so many times their distance, and no longer than so many samples.
 _QUANTILES = (0.01, 0.99)
 _FAR = 5.0
+# Where spikes are up to a tenth of the samples: closer quantiles, as far as those of normal noise.
+_CLOSER = (0.05, 0.95)
+_AS_FAR = 7.0
 _SHORT = 3
 # Shortest run of one value that is stuck; chance of a longer one in a sound record; steps around in last digits.
 _RUN = 5
@@ -106,6 +109,24 @@ class _Channel:
 
 
 @dataclass
+class _Rest:
+    """How long a channel stands at its first value."""
+
+    column: int | None
+    first: float | None = None
+    over: bool = False
+
+    def samples(self, values: Array) -> int:
+        """Samples at the beginning of a piece before the channel first moves."""
+        if self.over or not values.size:
+            return 0
+        self.first = float(values[0]) if self.first is None else self.first
+        moved = np.flatnonzero(values != self.first)
+        self.over = bool(moved.size)
+        return int(moved[0]) if moved.size else values.size
+
+
+@dataclass
 class Usual:
     """What the channels of a history are like, from a first reading.
 
@@ -128,20 +149,29 @@ class Usual:
             if c.clipped and not (c.apart and self.counts["stuck", n] >= c.at_limit)
         }
 
-    def faults(self, pieces: Iterator[tuple[Array, Array]]) -> Iterator[tuple[Array, Array, NDArray[np.bool_]]]:
-        """Pieces (any columns, channels) with a mask of the samples to leave out, counted as they pass."""
+    def faults(
+        self, pieces: Iterator[tuple[Array, Array]], resting: str = ""
+    ) -> Iterator[tuple[Array, Array, NDArray[np.bool_]]]:
+        """Pieces (any columns, channels) with a mask of the samples to leave out, counted as they pass.
+
+        Parameters
+        ----------
+        pieces : In their order.
+        resting : Channel that may stand at one value before it first moves: a motion that starts from rest.
+        """
         carried = np.zeros((0, len(self.names)))
         held: tuple[Array, Array] | None = None
+        rest = _Rest(self.names.index(resting) if resting in self.names else None)
         for piece in pieces:
             if held is not None:
                 ahead = piece[1][:_CARRIED]
-                yield (*held, self._mask(held[1], carried, ahead))
+                yield (*held, self._mask(held[1], carried, ahead, rest))
                 carried = held[1][-_CARRIED:]
             held = piece
         if held is not None:
-            yield (*held, self._mask(held[1], carried, held[1][:0]))
+            yield (*held, self._mask(held[1], carried, held[1][:0], rest))
 
-    def _mask(self, values: Array, before: Array, after: Array) -> NDArray[np.bool_]:
+    def _mask(self, values: Array, before: Array, after: Array, rest: _Rest) -> NDArray[np.bool_]:
         whole = np.vstack([before, values, after])
         inside = slice(len(before), len(before) + len(values))
         bad = np.zeros(len(values), dtype=bool)
@@ -158,6 +188,8 @@ class Usual:
                 known = known | marks["spike"]
             if len(column) > channel.longest:
                 marks["stuck"] = _stuck(column, channel) & ~known
+                if c == rest.column:
+                    marks["stuck"][inside][: rest.samples(values[:, c])] = False
                 known = known | marks["stuck"]
             if channel.often:
                 marks["sentinel"] = marks.get("sentinel", False) | (np.isin(column, channel.often) & ~known)
@@ -255,6 +287,11 @@ class _Learning:
         room = max(_FAR * (high - low), 0.01 * size) or 1e-3 * max(abs(end.first) for end in self.ends)
         if room > 0.0 and self.count > _AROUND:
             channel.low, channel.high = low - room, high + room
+            lower, upper = (float(np.quantile(kept, q)) for q in _CLOSER)
+            closer = _AS_FAR * (upper - lower)
+            # A channel of few digits has its usual values further apart than its quantiles.
+            if closer > max(_DIGITS * channel.digit, 0.01 * max(abs(lower), abs(upper))):
+                channel.low, channel.high = max(channel.low, lower - closer), min(channel.high, upper + closer)
         repeats = min(max(self.equal / max(self.equal + self.steps, 1), 1e-12), 1.0 - 1e-12)
         channel.longest = max(_RUN, math.ceil(math.log(_CHANCE / max(self.count, 1)) / math.log(repeats)))
         for end, word in zip(self.ends, ("largest", "smallest"), strict=True):
