@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import datetime
 import gzip
+import struct
 import sys
 
 import numpy as np
@@ -23,6 +24,7 @@ from made_campaigns import (
 )
 
 from ident.captive.campaign import read_campaign
+from ident.captive.readers.stored_records import stored_records
 from sim.files.errors import InputError
 
 NAMES = ["beta_deg", "X_N", "Y_N", "N_Nm"]
@@ -209,3 +211,82 @@ def test_a_packed_workbook_is_refused_as_packed(tmp_path):
     (tmp_path / "runs.xlsx.gz").write_bytes(gzip.compress((tmp_path / "runs.xlsx").read_bytes()))
     with pytest.raises(InputError, match="packed, and for the reader workbook"):
         runs_of(tmp_path, "runs.xlsx.gz")
+
+
+def document(folder, other) -> None:
+    """An OpenDocument of the runs by odfpy; ``other`` gives a cell of its own for row and column, or None."""
+    from odf.opendocument import OpenDocumentSpreadsheet
+    from odf.table import Table, TableCell, TableRow
+    from odf.text import P
+
+    made, table = OpenDocumentSpreadsheet(), Table(name="drift")
+    for i, row in enumerate([NAMES, *RUNS.tolist()]):
+        line = TableRow()
+        for k, value in enumerate(row):
+            own = other(i, k, value)
+            cell = TableCell(**own[0]) if own else TableCell(valuetype="float", value=value)
+            if own or isinstance(value, str):
+                cell = cell if own else TableCell(valuetype="string")
+                cell.addElement(P(text=own[1] if own else value))
+            line.addElement(cell)
+        table.addElement(line)
+    made.spreadsheet.addElement(table)
+    made.save(str(folder / "runs.ods"))
+
+
+@pytest.mark.parametrize(
+    ("stored", "shown", "words"),
+    [
+        ({}, "", "row 3, column Y_N: a formula without its result"),
+        ({"valuetype": "string", "stringvalue": ""}, "#DIV/0!", "row 3, column Y_N: '#DIV/0!'"),
+        ({"valuetype": "float", "value": 0}, "Err:502", "row 3, column Y_N: 'Err:502'"),
+        ({"valuetype": "float", "value": 5600.5}, "5600,5", ""),
+    ],
+)
+def test_formulas_of_an_opendocument_without_a_result(tmp_path, stored, shown, words):
+    document(tmp_path, lambda i, k, v: ({"formula": "of:=1/0", **stored}, shown) if (i, k) == (2, 2) else None)
+    if words:
+        with pytest.raises(InputError, match=words):
+            runs_of(tmp_path, "runs.ods")
+    else:
+        assert_values(runs_of(tmp_path, "runs.ods"))
+
+
+def compound_file(stream: bytes) -> bytes:
+    """A compound file of sectors of 512 bytes: its table, its directory, the stream Workbook."""
+    stream = stream.ljust(-(-max(len(stream), 4096) // 512) * 512, b"\0")
+    count = len(stream) // 512
+    head = b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1" + bytes(16) + struct.pack("<5H6x", 0x3E, 3, 0xFFFE, 9, 6)
+    head += struct.pack("<9I", 0, 1, 1, 0, 4096, 0xFFFFFFFE, 0, 0xFFFFFFFE, 0) + struct.pack(
+        "<109I", 0, *[0xFFFFFFFF] * 108
+    )
+    table = [0xFFFFFFFD, 0xFFFFFFFE, *range(3, count + 2), 0xFFFFFFFE]
+    name = "Workbook".encode("utf-16-le")
+    entry = name.ljust(64, b"\0") + struct.pack("<H", len(name) + 2) + bytes(50) + struct.pack("<2I4x", 2, len(stream))
+    return head + struct.pack(f"<{len(table)}I", *table).ljust(512, b"\xff") + entry.ljust(512, b"\0") + stream
+
+
+def test_errors_bare_formulas_and_hidden_rows_of_an_xls(tmp_path):
+    """Records of a worksheet as [MS-XLS] lays them out: BoolErr, Formula with an error and a blank result, Row."""
+
+    def record(kind: int, body: bytes) -> bytes:
+        return struct.pack("<2H", kind, len(body)) + body
+
+    sheet = record(0x0809, bytes(16)) + record(0x0208, struct.pack("<6H2H", 4, 0, 4, 255, 0, 0, 0x20, 0))
+    sheet += record(0x0205, struct.pack("<3H2B", 2, 1, 0, 0x2A, 1)) + record(
+        0x0205, struct.pack("<3H2B", 2, 3, 0, 1, 0)
+    )
+    for column, kind, code in ((0, 2, 7), (1, 3, 0), (2, 0, 0)):
+        sheet += record(0x0006, struct.pack("<3HBxBxxxH", 3, column, 0, kind, code, 0xFFFF) + bytes(6))
+    sheet += record(0x0006, struct.pack("<3Hd", 3, 3, 0, 1.5) + bytes(6)) + record(0x000A, b"")
+    begin = record(0x0809, bytes(16))
+    at = len(begin) + 4 + 13 + 4
+    stream = begin + record(0x0085, struct.pack("<I2B2B", at, 0, 0, 5, 0) + b"drift") + record(0x000A, b"") + sheet
+    path = tmp_path / "runs.xls"
+    path.write_bytes(compound_file(stream))
+    errors, bare, hidden = stored_records(path, "drift")
+    assert errors == {(3, 2): "#N/A", (4, 1): "#DIV/0!"}
+    assert (bare, hidden) == ({(4, 2)}, {5})
+    assert stored_records(path, "yaw") == ({}, set(), set())
+    path.write_bytes(compound_file(stream)[:700])
+    assert stored_records(path, "drift") == ({}, set(), set())

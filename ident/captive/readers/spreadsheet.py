@@ -38,6 +38,8 @@ def open_workbook(path: Path, source: Source) -> Sheet:
     except Exception as error:
         if not isinstance(error, (calamine.CalamineError, OSError, ValueError)):
             raise
+        if "password" in str(error).lower():
+            raise InputError(str(path), "a workbook with a password", "the workbook saved without one") from error
         if zipfile.is_zipfile(path):
             inside = ", ".join(zipfile.ZipFile(path).namelist()[:3])
             wrong = f"a zip archive of {inside[:100]}, and no workbook of that ending"
