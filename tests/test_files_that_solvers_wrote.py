@@ -164,3 +164,22 @@ def test_force_coefficients_of_openfoam_by_their_area(tmp_path):
     with pytest.raises(InputError, match=r"force coefficients of OpenFOAM.*reader = 'columns'"):
         reduced(tmp_path, "coefficient.dat", keys)
     assert_means(reduced(tmp_path, "coefficient.dat", 'reader = "columns"\n' + keys))
+
+
+@pytest.mark.parametrize("keys", ["names", "header_pattern", "patterns"])
+def test_an_su2_history_is_its_last_iterations_whatever_its_columns_are_called(tmp_path, keys):
+    lines = ['"Time_Iter","Outer_Iter","Inner_Iter","CFx","CFy","CMz"']
+    for step, row in enumerate(SERIES.tolist()):
+        lines += [",".join(map(repr, [step, 0, k, *(v + 9.0 - 3 * k for v in row)])) for k in range(4)]
+    (tmp_path / "run.csv").write_text("\n".join(lines) + "\n", "utf-8")
+    names = [*("a", "b", "c"), "X [N]", "Y [N]", "N [N m]"]
+    ignored = 'ignore = ["Time_Iter", "Outer_Iter", "Inner_Iter"]\n'
+    declared = '[source.columns]\nCFx = "X [N]"\nCFy = "Y [N]"\nCMz = "N [N m]"\n'
+    made = {
+        "names": f'names = {names!r}\ndelimiter = ","\nignore = ["a", "b", "c"]\n'.replace("'", '"'),
+        "header_pattern": f'header_pattern = "Inner_Iter"\ndelimiter = ","\n{ignored}{declared}',
+        "patterns": "[source.patterns]\n'^CFx$' = \"X [N]\"\n'^CFy$' = \"Y [N]\"\n'^CMz$' = \"N [N m]\"\n",
+    }
+    rule = '[source.reduction]\nkind = "steady"\nrate_hz = 20.0\n'
+    campaign(tmp_path, history("run.csv", made[keys], reduction=rule))
+    assert_means(read_campaign(tmp_path).runs)

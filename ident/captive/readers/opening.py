@@ -12,7 +12,16 @@ from ident.captive.readers.labview import open_lvm, open_tdms
 from ident.captive.readers.matlab import open_matlab
 from ident.captive.readers.parquet import open_parquet
 from ident.captive.readers.sheet import Sheet
-from ident.captive.readers.solvers import fluent_header, is_xy, open_fluent, open_plots, open_su2, open_tecplot, plots
+from ident.captive.readers.solvers import (
+    fluent_header,
+    is_xy,
+    open_fluent,
+    open_plots,
+    open_su2,
+    open_tecplot,
+    plots,
+    su2_header,
+)
 from ident.captive.readers.spreadsheet import open_workbook
 from ident.captive.readers.table import open_columns, open_csv
 from ident.captive.readers.text import COMMENTS, Lines, head, opened, packed, sniff
@@ -147,7 +156,7 @@ def reader_of(path: Path, source: Source) -> str:
     first = next(iter(lines), "")
     if fluent_header(lines) >= 0 or is_xy(lines):
         return "fluent"
-    if "Time_Iter" in first and "Inner_Iter" in first:
+    if su2_header(lines):
         return "su2"
     if re.match(r"(?i)\s*(TITLE|VARIABLES)\s*=", first):
         return "tecplot"
@@ -181,7 +190,10 @@ def open_sheet(path: Path, source: Source) -> Sheet:
         raise InputError(
             str(path), f"packed, and for the reader {reader}", "the file unpacked: text alone is read packed"
         )
-    return OPENERS[reader](path, source.model_copy(update={"reader": reader}))
+    as_read = source.model_copy(update={"reader": reader})
+    if reader in ("table", "starccm", "columns") and su2_header(head(path, source.encoding).text):
+        return open_su2(path, as_read, OPENERS[reader])
+    return OPENERS[reader](path, as_read)
 
 
 def inputs(path: Path) -> list[Path]:

@@ -6,7 +6,7 @@ import csv
 import math
 import re
 import shlex
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -74,19 +74,31 @@ def _open_xy(path: Path, source: Source) -> Sheet:
     return joined(path, [names[0], *curves], list(curves.values()), source, 2)
 
 
-def open_su2(path: Path, source: Source) -> Sheet:
+def su2_header(lines: list[str]) -> list[str]:
+    """The columns of an SU2 history, from the first of its lines; empty for any other file."""
+    names = [name.strip().strip('"') for name in lines[0].split(",")] if lines else []
+    return names if "Time_Iter" in names and "Inner_Iter" in names else []
+
+
+def open_su2(path: Path, source: Source, opener: Callable[[Path, Source], Sheet] = open_csv) -> Sheet:
     """A convergence history of SU2; of an unsteady run the last inner iteration of each time step.
+
+    Parameters
+    ----------
+    path, source : For the checks.
+    opener : What reads its table; the campaign may have given its columns other names.
 
     Raises
     ------
     InputError
         For what the reader of tables refuses.
     """
-    sheet = open_csv(path, source)
-    if "Time_Iter" not in sheet.header or "Inner_Iter" not in sheet.header:
+    sheet = opener(path, source)
+    own = su2_header(head(path, source.encoding).text)
+    if len(own) != len(sheet.header):
         return sheet
     every = np.vstack(list(sheet.numbers(list(range(len(sheet.header))))))
-    kept = _last_iterations(sheet.header, every)
+    kept = _last_iterations(own, every)
     return sheet if kept is every else array_sheet(path, sheet.header, list(kept.T), source, sheet.first_row)
 
 
