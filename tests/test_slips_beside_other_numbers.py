@@ -82,6 +82,13 @@ def renamed(old: str, new: str):
     return change
 
 
+def exchanged(one: str, other: str):
+    def change(table: pd.DataFrame) -> None:
+        table[[one, other]] = table[[other, one]].to_numpy()
+
+    return change
+
+
 def put(run: str, column: str, text: str):
     def change(table: pd.DataFrame) -> None:
         assert (table["run_id"] == run).any()
@@ -103,12 +110,14 @@ DRIFT = "drift_horizontal.csv"
 SLIPS = {
     "a side moment's sign": (
         "bb2", "propeller_side_force.csv", times("M_Nm", -1.0), "side_force", "error", "load at x = 0.53 L"),
-    "a roll moment's sign": ("bb2", DRIFT, times("K_Nm", -1.0), "levers", "warning", "below the axis"),
+    "a roll moment's sign": ("bb2", DRIFT, times("K_Nm", -1.0), "levers", "warning", "m below the axis"),
     "digits of an angle": (
         "bb2", DRIFT, put("HD-4-03-12", "beta_deg", "21"), "rows", "warning", "have 12 in its place"),
     "knots in one file": ("bb2", "estimates.csv", renamed("U_mps", "U_kts"), "units", "warning", "under two units"),
     "degrees in one file": (
         "bb2", "propeller_side_force.csv", renamed("q_radps", "q_degps"), "units", "warning", "under two units"),
+    "a moment point above the sail": ("bb2", DRIFT, times("K_Nm", 8.0), "levers", "warning", "m above the axis"),
+    "speeds for depths": ("starter", "arm_p.csv", exchanged("U_mps", "D0_m"), "units", "warning", "change places"),
     "a flow from the other side": (
         "bb2", "rotating_arm.csv", times("alpha_deg", -1.0, "RA-w"), "proportion", "warning", "X_wq"),
     "a thrust deduction of twice": (

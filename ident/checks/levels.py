@@ -94,6 +94,31 @@ def numbers_of_another_file(evidence: Evidence, rule: Rule) -> Iterator[Finding]
                 yield rule.finding(file, rows_of(group), [name], what)
 
 
+@check("units")
+def speeds_for_depths(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
+    """A file whose speeds are the depths of all others, and its depths their speeds: two columns changed places."""
+    campaign, runs = evidence.campaign, evidence.runs
+    if campaign is None:
+        return
+    ratio = campaign.header.scale.ratio
+    tested = runs[(runs["test"] != PUBLISHED) & (runs["U"].fillna(0.0) > 0.0) & (runs["D0"].fillna(0.0) > 0.0)]
+    tested = tested.assign(speed=tested["U"] / math.sqrt(ratio), depth=tested["D0"] / ratio)
+    numbers = {
+        str(file): tuple({_short(x) for x in group[c]} for c in ("speed", "depth"))
+        for file, group in tested.groupby("file", sort=False)
+    }
+    for file, (speeds, depths) in numbers.items():
+        rest = [sets for f, sets in numbers.items() if f != file]
+        others = [set().union(*(sets[k] for sets in rest)) for k in (0, 1)]
+        own = speeds & others[0] or depths & others[1]
+        if rest and not own and speeds <= others[1] and depths <= others[0]:
+            what = (
+                f"speeds of {min(speeds):g} m/s at depths of {min(depths):g} m (as tested), where the other files have "
+            )
+            what += "these speeds for depths and these depths for speeds: did two columns change places?"
+            yield rule.finding(file, rows_of(tested[tested["file"] == file]), ["U", "D0"], what)
+
+
 def _scaled(ratio: float) -> str:
     return f" (at the tested size, 1:{ratio:g})" if ratio != 1.0 else ""
 

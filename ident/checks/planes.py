@@ -84,13 +84,17 @@ def planes_of_runs(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
 
 @check("levers")
 def side_force_of_the_sail(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
-    """K over Y in drift of a boat with a sail: K = -z Y, and the side force acts between the axis and the sail top."""
+    """K over Y in drift: K = -z Y, and the side force acts on the hull, or between the axis and the top of a sail."""
     body, vehicle, runs = evidence.body, evidence.vehicle, evidence.runs
-    if body is None or body.mass is None or vehicle is None or vehicle.particulars.sail_top is None:
+    if body is None or body.mass is None or vehicle is None:
         return
-    top = float(vehicle.particulars.sail_top.value[2]) - float(vehicle.particulars.centre_of_buoyancy.value[2])
-    if not -top > rule.limits["sail"] * 0.5 * spheroid_diameter(body):
-        return
+    centre, particulars = float(vehicle.particulars.centre_of_buoyancy.value[2]), vehicle.particulars
+    above = centre - float(particulars.sail_top.value[2]) if particulars.sail_top is not None else 0.0
+    radius = 0.5 * spheroid_diameter(body)
+    sail = above > rule.limits["sail"] * radius
+    # Keels and rudders reach below the hull.
+    low, high = -rule.limits["off"] * radius, rule.limits["off"] * max(above, radius)
+    low = -rule.limits["share"] * above if sail else low
     of_test = runs[(runs["test"] == "drift_horizontal") & runs["part"].isin(HULL)]
     pairs = [
         (str(file), rows_of(group), slope(group, "beta", "K", body), slope(group, "beta", "Y", body))
@@ -102,9 +106,12 @@ def side_force_of_the_sail(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
             if roll in known and side in known:
                 pairs.append((*printed_place(runs, [roll]), known[roll][0], known[side][0]))
     for file, rows, turn, push in pairs:
-        height = -turn / push * body.length if push and math.isfinite(turn) else 0.0
-        if not height > -rule.limits["share"] * top:
+        if not push or not math.isfinite(turn):
             continue
-        what = f"K over Y in drift is that of a side force {height:.3g} m below the axis, and the sail is above it "
-        what += f"(its top by {-top:.3g} m): the sign of K, or the height of [moment_point]?"
+        height = turn / push * body.length + (centre if not sail else 0.0)
+        if low <= height <= high:
+            continue
+        where = f"{abs(height):.3g} m {'above' if height > 0.0 else 'below'} the axis"
+        what = f"K over Y in drift is that of a side force {where}, and the boat has hull and sail from {low:.3g} to "
+        what += f"{high:.3g} m above it: the sign of K, or the height of [moment_point]?"
         yield rule.finding(file, rows, ["K", "Y"], what)
