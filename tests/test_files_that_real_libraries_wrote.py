@@ -315,6 +315,7 @@ def test_gzip_is_unpacked(tmp_path):
         (b"#!TDV112", "Tecplot"),
         (b"\xef\xbb\xbf<?xml version", "XML"),
         (b"<html><table>", "HTML"),
+        (b"Auto-Transcript Start Time:  02:25", "a transcript of Fluent"),
         (b'{"X": 1}', "JSON"),
         (b"runs.csv".ljust(257, b"\0") + b"ustar", "a tar archive"),
     ],

@@ -103,7 +103,12 @@ def test_tecplot_zones(tmp_path, packing):
 
 @pytest.mark.parametrize("clock", ["Cur_Time", "rate"])
 def test_an_unsteady_su2_history_in_tecplot_form_is_its_last_iterations(tmp_path, clock):
-    lines = ['TITLE = "SU2"', 'VARIABLES = "Time_Iter","Outer_Iter","Inner_Iter","Cur_Time","CFx","CFy","CMz"', "ZONE"]
+    lines = [
+        'TITLE = "SU2"',
+        "VARIABLES = \\",
+        '"Time_Iter","Outer_Iter","Inner_Iter","Cur_Time","CFx","CFy","CMz"',
+        "ZONE",
+    ]
     for step, (t, *row) in enumerate(RECORD.tolist()):
         lines += [", ".join(map(repr, [step, 0, k, t, *(v + 9.0 - 3 * k for v in row)])) for k in range(4)]
     (tmp_path / "history.dat").write_text("\n".join(lines), "utf-8")

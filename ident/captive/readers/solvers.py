@@ -223,5 +223,7 @@ def _zone(
 
 
 def _names(text: str) -> list[str]:
+    # SU2 goes on in the next line behind a backslash.
+    text = text.strip().removesuffix("\\")
     quoted = re.findall(r'"([^"]*)"', text)
     return [n.strip() for n in quoted] if quoted else [n for c in csv.reader([text]) for w in c for n in w.split()]

@@ -32,6 +32,7 @@ _BINARY = {
     b"<!doctype html": "an HTML page (a workbook saved as HTML among them)",
     b"<html": "an HTML page (a workbook saved as HTML among them)",
     b"<table": "an HTML page (a workbook saved as HTML among them)",
+    b"Auto-Transcript Start Time": "a transcript of Fluent (its report files are read)",
     b'{"': "a JSON document",
     b'[{"': "a JSON document",
     b"CDF\x01": "a netCDF file",
