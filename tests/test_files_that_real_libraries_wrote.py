@@ -227,6 +227,24 @@ def test_lvm_files_without_a_clock_or_with_one_a_channel(tmp_path, clock):
     assert_means(reduced(tmp_path, "run.lvm", named))
 
 
+def test_a_tdms_file_damaged_anywhere_is_refused_or_read(tmp_path):
+    """Whatever the library stumbles over, in its header above all."""
+    nptdms = pytest.importorskip("nptdms")
+    wave = {"unit_string": "N", "wf_increment": 0.05}
+    with nptdms.TdmsWriter(str(tmp_path / "run.tdms")) as writer:
+        writer.write_segment([nptdms.ChannelObject("run", "X", SERIES[:, 0], properties=wave)])
+    whole = (tmp_path / "run.tdms").read_bytes()
+    campaign(tmp_path, history("run.tdms"))
+    refused = 0
+    for cut in range(4, 200, 7):
+        (tmp_path / "run.tdms").write_bytes(whole[:cut] + whole[cut + 3 :])
+        try:
+            read_campaign(tmp_path)
+        except InputError:
+            refused += 1
+    assert refused > 20
+
+
 # -- universal files ----------------------------------------------------------------------------------
 
 

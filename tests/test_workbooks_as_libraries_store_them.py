@@ -290,3 +290,17 @@ def test_errors_bare_formulas_and_hidden_rows_of_an_xls(tmp_path):
     assert stored_records(path, "yaw") == ({}, set(), set())
     path.write_bytes(compound_file(stream)[:700])
     assert stored_records(path, "drift") == ({}, set(), set())
+
+
+@pytest.mark.parametrize("damage", ["directory", "half", "part"])
+def test_a_damaged_workbook_is_refused_as_one(tmp_path, damage):
+    book(tmp_path, "runs.xlsx", [NAMES, *RUNS.tolist()])
+    whole = (tmp_path / "runs.xlsx").read_bytes()
+    wrong = {
+        "directory": whole.replace(b"PK\x01\x02", b"PK\x01\x07"),
+        "half": whole[: len(whole) // 2],
+        "part": whole.replace(b"xl/workbook.xml", b"xl/workbook.xyz"),
+    }
+    (tmp_path / "runs.xlsx").write_bytes(wrong[damage])
+    with pytest.raises(InputError, match=r"runs\.xlsx: (not a workbook|a zip archive|0 worksheets)"):
+        runs_of(tmp_path, "runs.xlsx")

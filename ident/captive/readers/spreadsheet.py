@@ -35,14 +35,15 @@ def open_workbook(path: Path, source: Source) -> Sheet:
     try:
         book = calamine.CalamineWorkbook.from_path(str(path))
         sheets = {name: book.get_sheet_by_name(name).to_python(skip_empty_area=False) for name in _visible(book)}
-    except Exception as error:
-        if not isinstance(error, (calamine.CalamineError, OSError, ValueError)):
+    except BaseException as error:
+        # A panic of the library's own language is no Exception.
+        panic = type(error).__name__ == "PanicException"
+        if not panic and not isinstance(error, (calamine.CalamineError, OSError, ValueError)):
             raise
         if "password" in str(error).lower():
             raise InputError(str(path), "a workbook with a password", "the workbook saved without one") from error
-        if zipfile.is_zipfile(path):
-            inside = ", ".join(zipfile.ZipFile(path).namelist()[:3])
-            wrong = f"a zip archive of {inside[:100]}, and no workbook of that ending"
+        if inside := _inside(path):
+            wrong = f"a zip archive of {inside}, and no workbook of that ending"
             raise InputError(
                 str(path), wrong, "its files unpacked, or gzip; a workbook as xlsx, xlsb or ods"
             ) from error
@@ -54,6 +55,16 @@ def open_workbook(path: Path, source: Source) -> Sheet:
     filled = [name for name, rows in sheets.items() if any(_filled(row) for row in rows)]
     name = chosen(path, filled, source, "worksheet")
     return _sheet(path, name, sheets[name], source)
+
+
+def _inside(path: Path) -> str:
+    """The first files of a zip archive, in words; empty for a workbook, and for a file that is none or is damaged."""
+    try:
+        with zipfile.ZipFile(path) as packed:
+            names = packed.namelist()
+            return "" if {"xl/workbook.xml", "content.xml"} & set(names) else ", ".join(names[:3])[:100]
+    except (zipfile.BadZipFile, OSError, ValueError):
+        return ""
 
 
 def _visible(book: Any) -> list[str]:
