@@ -44,7 +44,7 @@ def open_hdf5(path: Path, source: Source) -> Sheet:
             groups: dict[str, dict[str, tuple[np.ndarray, str]]] = {}
             objects: dict[str, str] = {}
             _collect(h5py, opened, "", groups, source, objects)
-    except (OSError, RuntimeError, KeyError, ValueError) as error:
+    except Exception as error:
         raise InputError(str(path), f"not an HDF5 file: {str(error)[:100]}", "a whole file") from error
     refuse_objects(path, objects, bool(groups), source)
     name = chosen(path, list(groups), source, "group")
@@ -195,7 +195,7 @@ def open_netcdf(path: Path, source: Source) -> Sheet:
                 if values.ndim <= 1 and values.dtype.kind in "iuf" and values.size
             }
             wide = {k: " x ".join(map(str, v.shape)) for k, v, _ in read if v.ndim > 1 and v.dtype.kind in "iuf"}
-    except (OSError, ValueError, TypeError, IndexError, KeyError) as error:
+    except Exception as error:
         raise InputError(str(path), f"not a netCDF file: {str(error)[:100]}", "a whole file") from error
     refuse_objects(path, wide, any(len(v) > 1 for v, _ in vectors.values()), source)
     if not any(len(v) > 1 for v, _ in vectors.values()):

@@ -36,7 +36,8 @@ def open_matlab(path: Path, source: Source) -> Sheet:
 
     try:
         stored = loadmat(str(path), squeeze_me=True, struct_as_record=False)
-    except (ValueError, TypeError, NotImplementedError, OSError, MemoryError, IndexError, KeyError) as error:
+    except Exception as error:
+        # Reading, unpacking and decoding fail each in their way.
         raise InputError(
             str(path), f"not a MATLAB file: {str(error)[:100]}", "a whole file of save -v7 or -v7.3"
         ) from error
