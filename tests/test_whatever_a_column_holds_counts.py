@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
-from declared_campaigns import DRIFT, HEAD, ROWS, differs
+from declared_campaigns import DRIFT, HEAD, ROWS, differs, outcome
 
 import ident
 from ident.captive.quantities import table
@@ -121,3 +121,21 @@ def test_every_text_column_counts(tmp_path, column):
         }
         before, after = {**arm, **turn}, {**arm, **turned}
     differs(tmp_path, own, own, before, after, words=column == "source")
+
+
+SUBOFF = {"vehicle": "suboff", "scale": {"ratio": 1.0, "length_m": 4.2609}}
+
+
+@pytest.mark.parametrize(
+    ("text", "refused"),
+    [
+        ("coefficient,value,rel_sigma,U_mps\nY_v,-0.025,0.05,3\nN_v,-0.011,0.05,3\n", "column U: 3"),
+        # A table for one speed: values without a speed in their unit are in it too.
+        ("coefficient,value,unit,rel_sigma,U_mps\nY_v,-681,kg/s,0.05,3\nY_vdot,-583,kg,0.05,3\n", ""),
+        ("coefficient,value,rel_sigma,sigma_value\nY_v,-0.025,0.05,0.001\n", "column rel_sigma: 0.05"),
+        ("coefficient,value,rel_sigma,sigma_value\nY_v,-0.025,0.05,0.001\nN_v,-0.011,0.05,\n", ""),
+    ],
+)
+def test_a_speed_or_error_that_no_published_value_uses_is_refused(tmp_path, text, refused):
+    result = outcome(tmp_path, {**HEAD, **SUBOFF, "source": [PRINTED]}, {"drift.csv": text}, estimated=False)
+    assert refused in result["refused"] if refused else "refused" not in result

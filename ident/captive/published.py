@@ -226,6 +226,7 @@ def to_program(
     chosen = (runs["coefficient"] != "") | (runs["test"] == TEST) | runs["value"].notna() | (runs["unit"] != "")
     terms = {t.name: t for t in vehicle_terms(vehicle)}
     out = runs.copy()
+    idle_speeds: dict[str, tuple[str, float] | None] = {}
     for i, run in runs[chosen].iterrows():
         place = f"{folder}/{run['file']}, row {run['row']}"
         if run["unit"] and str(run.get("value_unit") or ""):
@@ -248,4 +249,13 @@ def to_program(
         out.loc[i, "value"] = run["value"] * made
         if "s_value" in out:
             out.loc[i, "s_value"] = run["s_value"] * abs(made)
+        if pd.notna(run.get("U")):
+            faster = factor_of(run.where(run.index != "U", 2.0 * run["U"]), term, header, vehicle, place)
+            idle_speeds.setdefault(str(run["file"]), (place, float(run["U"])))
+            # One value of a file that is for a speed is what the column is there for.
+            idle_speeds[str(run["file"])] = None if faster != made else idle_speeds[str(run["file"])]
+    for idle in idle_speeds.values():
+        if idle is not None:
+            text = "nothing, or the unit of values that are for a speed, such as kg/s of Y_v"
+            raise InputError(f"{idle[0]}, column U", f"{idle[1]:g}, declared and unused", text)
     return out

@@ -146,6 +146,11 @@ def refuse_idle_quantities(runs: pd.DataFrame) -> None:
         if f"s_{output}" in runs:
             text = "nothing: a published coefficient has sigma_value or rel_sigma"
             _refuse(runs, published & runs[f"s_{output}"].notna(), f"s_{output}", text)
+    if "s_value" in runs and "rel_sigma" in runs:
+        text = "nothing: sigma_value is the error of this row"
+        # Beside rows without one it is the usual error.
+        if runs.loc[published, "s_value"].notna().all():
+            _refuse(runs, published & runs["rel_sigma"].notna(), "rel_sigma", text)
     for name, used in (("exclude", ("", "value")), ("decoupled", ("", "False"))):
         if name in runs:
             text = f"nothing{' but value' if name == 'exclude' else ''}: a published coefficient has no loads"
