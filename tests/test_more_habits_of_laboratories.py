@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -24,7 +26,7 @@ from made_campaigns import (
 
 from ident.captive.campaign import read_campaign
 from ident.captive.headers import column
-from ident.captive.quantities import powers_of, split
+from ident.captive.quantities import factor, powers_of, split
 from ident.checks.check import check_campaign
 from sim.files.errors import InputError
 
@@ -89,6 +91,24 @@ def test_per_degree_in_any_spelling(unit):
     assert found is not None
     assert found[0] == pytest.approx(180.0 / np.pi)
     assert found[1:] == (0.0, 0.0, 0.0, -1)
+
+
+@pytest.mark.parametrize(
+    ("header", "quantity", "expected"),
+    [
+        ("回頭ﾓｰﾒﾝﾄ[kgf･m]", "N", 9.80665),
+        ("横力（Ｎ）", "Y", 1.0),
+        ("モーメント（ｋＮ・ｍ）", "N", 1000.0),
+        ("速度［㎧］", "U", 1.0),
+        ("漂角(度)", "beta", math.radians(1.0)),
+        ("Mz, кгс·м", "N", 9.80665),
+        ("n, об/мин", "n", 1.0 / 60.0),
+        ("加速度 [m/s²]", "vdot", 1.0),
+    ],
+)
+def test_units_in_letters_of_other_scripts(header, quantity, expected):
+    """Wide letters and brackets, middle dots of Japanese text, Cyrillic."""
+    assert factor(quantity, split(header)[1] or "") == pytest.approx(expected, rel=1e-12)
 
 
 def test_a_radius_in_lengths_says_what_to_state():

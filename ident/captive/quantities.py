@@ -8,6 +8,7 @@ have the dimension of the quantity.
 from __future__ import annotations
 
 import re
+import unicodedata
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
@@ -34,6 +35,8 @@ PRIMED = {
 }
 _BRACKET = re.compile(r"^(?P<name>.*?)\s*(?:\[(?P<square>[^\[\]]*)\]|\((?P<round>[^()]*)\))$", re.DOTALL)
 _PART = re.compile(r"([A-Za-zµ]+)(?:(?:\*\*|\^)?(-?[1-4]))?")
+# Brackets as wide as a character of Chinese or Japanese text.
+_WIDE = str.maketrans("（）［］／，", "()[]/,")
 RAISED = str.maketrans("⁻⁺⁰¹²³⁴⁵⁶⁷⁸⁹", "-+0123456789")
 # A unit with a power of ten before it: 10^3 N, 1e3 N, 10³ N.
 _POWER = re.compile(
@@ -123,7 +126,7 @@ def owner(quantity: str) -> str:
 
 def split(header: str) -> tuple[str, str | None]:
     """A header as name and unit in brackets; the unit is None when there are no brackets."""
-    parts = _BRACKET.match(header.strip())
+    parts = _BRACKET.match(header.strip().translate(_WIDE))
     if not parts:
         after = _AFTER.match(header.strip())
         if after and is_unit(after["unit"].strip()):
@@ -133,14 +136,21 @@ def split(header: str) -> tuple[str, str | None]:
     return parts["name"].strip(), unit.strip()
 
 
+def _plain(unit: str) -> str:
+    """A unit with the letters of East Asian sets as those of ASCII: ``Ｎ``, ``㎏``, half-width middle dots."""
+    # Raised digits stay: to this table m² is m2.
+    kept = {*"°ºµ·", *map(chr, RAISED)}
+    return "".join(c if c in kept else unicodedata.normalize("NFKC", c) for c in unit).replace("\u2215", "/")
+
+
 def _clean(unit: str) -> str | None:
     """A unit in the one spelling handed to pint, or None when it is not made of units."""
     # 1/Deg, /deg and per degree are one.
-    text = re.sub(r"(?i)\bdeg(?:s|rees?)?\b\.?", "deg", unit.strip())
+    text = re.sub(r"(?i)\bdeg(?:s|rees?)?\b\.?", "deg", _plain(unit).strip())
     text = re.sub(r"^(?:/|[Pp]er\s)\s*", "1/", re.sub(r"\s+[Pp]er\s+", "/", text))
     text = re.sub(r"(?<=[A-Za-z])-(?=[A-Za-z])", "*", text)
     text = text.replace("°", "deg").replace("º", "deg").translate(RAISED)
-    text = re.sub(r"[·⋅.]", "*", text.replace("^", "**"))
+    text = re.sub(r"[·⋅∙•‧・.]", "*", text.replace("^", "**"))
     text = re.sub(r"(?<![*/])\s+(?![*/])", "*", text.strip())
     # A product in brackets divides as a whole: kg/(m rad) is kg/m/rad.
     text = re.sub(r"/\s*\(([^()]*)\)", lambda m: "/" + re.sub(r"(?<!\*)\*(?!\*)", "/", m[1].strip()), text)
