@@ -124,6 +124,27 @@ def test_the_displacement_of_a_table_is_its_amplitude(tmp_path):
         of_table(tmp_path / "d", displacement_m=2.0 * AMPLITUDE)
 
 
+@pytest.mark.parametrize("header", ["Stroke [mm]", "2A [mm]", "Hub [mm]", "Schwingbreite [mm]", "y_max - y_min [mm]"])
+def test_a_way_between_both_ends_is_no_amplitude_of_a_table(tmp_path, header):
+    """Twice the amplitude under another name; in a record the stroke is where the body is."""
+    known = of_table(tmp_path / "known")
+    own = {"vdot [m/s^2]": None, header: 2000.0 * AMPLITUDE}
+    columns = f'[source.columns]\n"{header}" = "displacement"\n'
+    with pytest.raises(InputError, match="way between both ends"):
+        of_table(tmp_path / "silent", columns, **own)
+    said = of_table(tmp_path / "said", f'{columns}[source.factor]\n"{header}" = 0.5\n', **own)
+    np.testing.assert_allclose(said[["vdot", "beta", "Y"]], known[["vdot", "beta", "Y"]], rtol=1e-9, atol=1e-9)
+    plain = of_table(
+        tmp_path / "plain", columns.replace(header, "Weg [mm]"), **{**own, header: None, "Weg [mm]": 300.0}
+    )
+    np.testing.assert_allclose(plain["vdot"], known["vdot"], rtol=1e-9, atol=1e-9)
+    table = record().rename(columns={"displacement_m": header})
+    table[header] *= 1000.0
+    swing = findings(tmp_path / "record", table, columns, f"frequency_hz = {FREQUENCY}\n", "inertia_sign")
+    assert not swing
+    assert read_campaign(tmp_path / "record").runs["vdot"].min() == pytest.approx(ACCELERATION, rel=1e-3)
+
+
 def test_a_phase_that_nothing_says_is_named(tmp_path):
     bare = record().drop(columns="displacement_m")
     stated = f"frequency_hz = {FREQUENCY}\namplitude = {AMPLITUDE}\n"

@@ -81,6 +81,11 @@ _DIAMETER = re.compile(r"(?i)^d\b|\bdia(?:m\w*)?\b")
 _NO_AMPLITUDE = re.compile(
     r"(?i)(?<![a-z])(?:p(?:ea)?k?\s?-?\s?(?:to\s?-?\s?)?p(?:ea)?k?|double\s?-?\s?amp\w*|r\.?m\.?s\.?)(?![a-z])"
 )
+# Words of a way between both ends: in a record that is where the body is, in a table it is no amplitude.
+_BOTH_WAYS = re.compile(
+    r"(?i)(?<![a-z])(?:stroke|hub|travel|width|range|full|total|trough|course|twice|doppel\w*|\w*breite)(?![a-z])"
+    r"|(?<![\w.])2\s*[*x\u00b7\u00d7]?\s*[ayz](?![a-z])|max\w*\s*[-\u2212\u2013]\s*\w*min|[\u5168\u4e21]\u632f\u5e45"
+)
 _BEHIND_IT = re.compile(r"(?i)(?<![a-z])(?:lag(?:s|ged|ging)?|behind|delay\w*|retard\w*)(?![a-z])")
 _AHEAD = re.compile(r"(?i)(?<![a-z])(?:lead\w*|ahead|advance\w*)(?![a-z])")
 _OF_ANOTHER = re.compile(r"(?i)(?<![a-z])(?:vel(?:oc\w*)?|acc(?:el\w*)?|cos(?:ine)?)(?![a-z])")
@@ -100,6 +105,20 @@ def _of_an_oscillation(name: str, header: str, place: str) -> None:
     if other is not None and _OF_ANOTHER.search(header):
         text = "phases to the sine of the displacement; or a factor of 1.0 in [source.factor] where these are"
         raise InputError(place, f"a header that names another reference, declared as {name}", text)
+
+
+def refuse_both_ways(kind: Column, where: str) -> None:
+    """Refuse the displacement of a table of harmonics under a header that names the way between both ends.
+
+    Raises
+    ------
+    InputError
+        Naming the column.
+    """
+    if kind.quantity == "displacement" and _BOTH_WAYS.search(split(kind.name)[0]):
+        text = "a factor in [source.factor]: 0.5 of the way from end to end, 1.0 of an amplitude"
+        place = f"{where}, column {kind.name[:60]!r}"
+        raise InputError(place, "a header that names a way between both ends, and the amplitude is meant", text)
 
 
 def _contradiction(quantity: str, header: str, unit: str, place: str) -> None:

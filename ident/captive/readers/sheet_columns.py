@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import replace
 
-from ident.captive.headers import column
+from ident.captive.headers import column, refuse_both_ways
 from ident.captive.patterns import search
 from ident.captive.quantities import Column, owner, split
 from ident.captive.readers.sheet import Sheet, ignored
@@ -59,7 +59,11 @@ def columns_of(sheet: Sheet, source: Source, text: tuple[str, ...]) -> list[Colu
         elif (declared is None and (source.patterns or ignored(header, source))) or (declared or header) in text:
             known.append(None)
         else:
-            known.append(_times(column(header, declared, sheet.where, source.factor), source, sheet.where))
+            read = column(header, declared, sheet.where, source.factor)
+            times = _times(read, source, sheet.where)
+            if source.rows == "runs" and times is read:
+                refuse_both_ways(read, sheet.where)
+            known.append(times)
     for key in source.columns:
         if key not in sheet.header and key not in [split(h)[0] for h in sheet.header]:
             shown = ", ".join(sheet.header)[:200]
