@@ -118,6 +118,12 @@ SLIPS = {
         "bb2", "propeller_side_force.csv", renamed("q_radps", "q_degps"), "units", "warning", "under two units"),
     "a moment point above the sail": ("bb2", DRIFT, times("K_Nm", 8.0), "levers", "warning", "m above the axis"),
     "speeds for depths": ("starter", "arm_p.csv", exchanged("U_mps", "D0_m"), "units", "warning", "change places"),
+    "a test of another file": (
+        "starter", DRIFT, put("drift_horizontal-04", "test", "rotating_arm"), "rows", "warning", "has no p, q, r"),
+    "a rate that was lost": (
+        "starter", "rotation_q.csv", put("rotation_q-04", "q_radps", "0."), "rows", "warning", "without speed, rate"),
+    "an exclude that was lost": (
+        "suboff", "stand_in_propeller.csv", put("OW-0.0", "exclude", ""), "rows", "warning", "uses KQ"),
     "a flow from the other side": (
         "bb2", "rotating_arm.csv", times("alpha_deg", -1.0, "RA-w"), "proportion", "warning", "X_wq"),
     "a thrust deduction of twice": (

@@ -43,6 +43,69 @@ def a_run_of_another_part(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
             yield rule.finding(str(file), rows_of(odd), ["part"], what)
 
 
+# Test -> motions of which it is made of one at the least.
+_OF_TEST = {
+    "rotating_arm": ("p", "q", "r"),
+    "pure_rotation": ("p", "q", "r"),
+    "acceleration": tuple(ACCELERATIONS),
+    "plane_deflection": ("plane",),
+}
+
+
+@check("rows")
+def a_run_of_another_test(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
+    """One run of a test among many of one other test of its file, without the motion that its own test is made of."""
+    runs = evidence.runs
+    tested = runs[runs["test"] != PUBLISHED]
+    for file, group in tested.groupby("file", sort=False):
+        counts = group["test"].value_counts()
+        if len(counts) != 2 or counts.iloc[1] != 1 or counts.iloc[0] < rule.limits["others"]:
+            continue
+        odd = group[group["test"] == counts.index[1]]
+        motions = list(_OF_TEST.get(str(counts.index[1]), ()))
+        if motions and (odd[motions].fillna(0.0) == 0.0).all(axis=None):
+            what = f"run {odd['run_id'].iloc[0]} is of {counts.index[1]} and has no {', '.join(motions)}; the "
+            what += f"{counts.iloc[0]} others of its file are of {counts.index[0]}"
+            yield rule.finding(str(file), rows_of(odd), ["test"], what)
+
+
+@check("rows")
+def a_load_at_rest(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
+    """Loads of a body that neither moves nor is moved: water at rest makes none, and no coefficient takes them."""
+    runs = evidence.runs
+    measured = runs[~runs["test"].isin([PUBLISHED, "open_water", "self_propulsion"])]
+    still = (measured[["U", "n", "p", "q", "r", *ACCELERATIONS]].fillna(0.0) == 0.0).all(axis=1)
+    resting = measured[still & measured["U"].notna()]
+    for file, group in resting.groupby(together(resting), sort=False):
+        acts = {o: kept(group, o) & (group[o].fillna(0.0) != 0.0) for o in OUTPUTS}
+        loads = [o for o, some in acts.items() if some.any()]
+        if loads:
+            bad = group[np.any(list(acts.values()), axis=0)]
+            what = f"{' '.join(loads)} of run {bad['run_id'].iloc[0]}, and {len(bad) - 1} more, without speed, rate or "
+            what += "acceleration: a number that was lost? A zero reading is taken off by [[tare]]"
+            yield rule.finding(str(file), rows_of(bad), loads, what)
+
+
+@check("rows")
+def a_run_that_keeps_what_the_others_exclude(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
+    """One run of a file that uses a load which all others of its test leave out."""
+    runs = evidence.runs
+    if "exclude" not in runs:
+        return
+    tested = runs[runs["test"] != PUBLISHED]
+    tested = tested.assign(out=tested["exclude"].fillna("").str.split())
+    for (file, test), group in tested.groupby(["file", "test"], sort=False):
+        if len(group) <= rule.limits["others"]:
+            continue
+        for load in sorted({name for names in group["out"] for name in names if name in group}):
+            without = np.array([load in names for names in group["out"]])
+            odd = group[~without & group[load].notna().to_numpy()]
+            if len(odd) == 1 and without.sum() == len(group) - 1:
+                what = f"run {odd['run_id'].iloc[0]} uses {load}, which the {without.sum()} other {test} runs of its "
+                what += "file exclude"
+                yield rule.finding(str(file), rows_of(odd), ["exclude", load], what)
+
+
 @check("rows")
 def a_load_in_order_by_itself(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
     """A load that only rises or falls from row to row of a file, where no state and no other load does."""
