@@ -103,6 +103,26 @@ def test_an_array_of_structs_is_a_table_of_runs(tmp_path):
     assert_values(runs_of(tmp_path, "runs.mat"))
 
 
+@pytest.mark.parametrize("compressed", [False, True])
+def test_a_matlab_file_whose_elements_do_not_fit_is_refused(tmp_path, compressed):
+    """scipy takes the class of a variable as it stands: one that there is not ends the process."""
+    from scipy.io import savemat
+
+    savemat(tmp_path / "run.mat", columns(), do_compression=compressed)
+    assert_means(reduced(tmp_path, "run.mat"))
+    whole = (tmp_path / "run.mat").read_bytes()
+    for cut in (129, 137, 200, len(whole) - 3):
+        (tmp_path / "run.mat").write_bytes(whole[:cut])
+        with pytest.raises(InputError, match=r"run\.mat"):
+            reduced(tmp_path, "run.mat")
+    if not compressed:
+        # Header, tag of the variable, tag of its flags, class.
+        at = 128 + 8 + 8
+        (tmp_path / "run.mat").write_bytes(whole[:at] + b"\x5d" + whole[at + 1 :])
+        with pytest.raises(InputError, match="a variable of class 93 at byte 136"):
+            reduced(tmp_path, "run.mat")
+
+
 def test_a_matrix_with_a_channel_a_row(tmp_path):
     from scipy.io import savemat
 

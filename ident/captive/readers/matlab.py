@@ -9,12 +9,15 @@ import numpy as np
 
 from ident.captive.readers.arrays import array_sheet, chosen, of_one_length
 from ident.captive.readers.hdf5 import open_hdf5, refuse_objects
+from ident.captive.readers.matlab_elements import damaged
 from ident.captive.readers.sheet import Sheet
 from ident.captive.source import Source
 from sim.files.errors import InputError
 
 # Where a file of version 7.3 says its version, whatever wrote the text before it.
 _VERSION_7_3 = b"\x00\x02"
+# Bytes of a file that is looked through before it is read.
+_LARGEST = 1 << 27
 
 
 def open_matlab(path: Path, source: Source) -> Sheet:
@@ -31,6 +34,8 @@ def open_matlab(path: Path, source: Source) -> Sheet:
         start = stream.read(128)
     if start.startswith((b"\x89HDF", b"MATLAB 7.3")) or start[124:126] == _VERSION_7_3:
         return open_hdf5(path, source)
+    if start[126:128] in (b"IM", b"MI") and path.stat().st_size <= _LARGEST and (wrong := damaged(path.read_bytes())):
+        raise InputError(str(path), f"not a MATLAB file: {wrong[:100]}", "a whole file of save -v7 or -v7.3")
     from scipy.io import loadmat
     from scipy.io.matlab import MatlabOpaque
 
