@@ -143,6 +143,14 @@ def test_a_wrong_or_missing_unit_is_refused_with_what_is_allowed(tmp_path, heade
         ("K", "N.m", 1.0),
         ("alpha", "°", np.pi / 180),
         ("frequency", "rad/s", 0.5 / np.pi),
+        ("n", "s⁻¹", 1.0),
+        ("n", "min⁻¹", 1 / 60),
+        ("n", "r.p.m.", 1 / 60),
+        ("r", "dps", np.pi / 180),
+        ("X", "kg-f", 9.80665),
+        ("N", "N×m", 1.0),
+        ("N", "mNm", 1e-3),
+        ("N", "kgfcm", 0.0980665),
     ],
 )
 def test_units_of_the_trade(quantity, unit, expected):

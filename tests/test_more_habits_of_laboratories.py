@@ -376,3 +376,15 @@ def test_a_factor_makes_newtons_of_volts(tmp_path):
     assert runs["X"].tolist() == pytest.approx([-100.0, -100.0])
     with pytest.raises(InputError, match="unit 'kN', declared as 'N'"):
         read(tmp_path, text.replace("mV", "kN"), tidy("", named + "\n[source.factor]\nbridge = 50.0"))
+
+
+@pytest.mark.parametrize("unit", ["(deg)", "[°]", "deg"])
+def test_a_row_of_units_that_is_not_declared_names_the_key(tmp_path, unit):
+    text = f"beta,X_N,Y_N,N_Nm\n{unit},,,\n2,1,2,3\n"
+    with pytest.raises(InputError, match="units_row = true"):
+        read(tmp_path, text, tidy("", 'beta = "beta [deg]"'))
+
+
+def test_columns_parted_by_another_mark_are_called_so(tmp_path):
+    with pytest.raises(InputError, match=r"one column, and 3 times '\|'"):
+        read(tmp_path, "beta_deg|X_N|Y_N|N_Nm\n2|1|2|3\n", tidy())

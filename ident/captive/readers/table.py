@@ -146,6 +146,9 @@ def open_csv(path: Path, source: Source) -> Sheet:
         header.pop()
     if not header:
         raise InputError(where, "a column without a name", "a name for every column")
+    if len(header) == 1 and (mark := next((m for m in "|&" if header[0].count(m) > 1), "")):
+        wrong = f"one column, and {header[0].count(mark)} times {mark!r} in its name"
+        raise InputError(where, wrong, "columns parted by commas, semicolons, tabs or blanks")
     rows = [dialect.cells(line, f"{path}, row {row}") for row, line in zip(first.rows[1:], first.text[1:], strict=True)]
     longest = max((i + 1 for cells in rows[:1] for i, cell in enumerate(cells) if cell), default=0)
     if longest > len(header):

@@ -20,6 +20,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from ident.captive.patterns import compiled
+from ident.captive.quantities import known_unit
 from ident.captive.readers.times import FORMS, Clocks
 from ident.captive.readers.unread import BEGINNING, unread
 from ident.captive.source import Encoding
@@ -378,6 +379,8 @@ def odd(cell: str) -> str:
         return "; a number in brackets may be negative or doubtful: write it with its sign"
     if re.fullmatch(r"[+-]?\d[\d.]*,\d+", cell.strip()):
         return "; or decimal (or thousands) = ',' in [[source]]"
+    if re.search(r"[A-Za-z\u00b0]", cell) and known_unit(cell.strip().strip("[]()")):
+        return "; units_row = true in [[source]] where the row below the header holds the units"
     return ""
 
 
