@@ -124,6 +124,8 @@ SLIPS = {
         "starter", "rotation_q.csv", put("rotation_q-04", "q_radps", "0."), "rows", "warning", "without speed, rate"),
     "an exclude that was lost": (
         "suboff", "stand_in_propeller.csv", put("OW-0.0", "exclude", ""), "rows", "warning", "uses KQ"),
+    "pounds in a turn with drift": (
+        "starter", "arm_r.csv", times("Y_N", 1.0 / 4.4482216152605), "proportion", "warning", "Y_v|r|"),
     "a flow from the other side": (
         "bb2", "rotating_arm.csv", times("alpha_deg", -1.0, "RA-w"), "proportion", "warning", "X_wq"),
     "a thrust deduction of twice": (
@@ -166,6 +168,31 @@ def test_a_quality_word_that_leaves_nothing_is_named(place):
     assert "factor = 1.0" in text
     header.write_text(text.replace("factor = 1.0", "factor = 40.0", 1), "utf-8")
     assert ("errors", "warning") in [f[:2] for f in found(header.parent)]
+
+
+@pytest.mark.parametrize(
+    ("span", "named"), [([-20.0, 20.0], 0), ([0.0, 20.0], 0), ([-2.0, 20.0], 1), ([-200.0, 20.0], 1)]
+)
+def test_a_range_of_drift_is_the_same_to_both_sides(place, span, named):
+    campaign = read_campaign(place("starter"))
+    source = campaign.header.source[0].model_copy(update={"within": {"beta_deg": span, "alpha_deg": [-3.0, 9.0]}})
+    header = campaign.header.model_copy(update={"source": [source]})
+    functions = {f.__name__: f for f in registered()["symmetry"]}
+    evidence = evidence_of(replace(campaign, header=header))
+    findings = list(functions["ranges_of_two_sides"](evidence, rules()["symmetry"]))
+    assert [f.columns for f in findings] == [("source.within.beta_deg",)] * named
+
+
+def test_a_term_whose_only_value_is_excluded_is_missing(place):
+    path = place("remus100") / "published.csv"
+    table = pd.read_csv(path, dtype=str, keep_default_na=False)
+    left = table[table["run_id"] != "P01-Yvv-corrected"]
+    assert len(left) == len(table) - 1
+    assert (left["coefficient"] == "Y_v|v|").any()
+    left.to_csv(path, index=False)
+    campaign = read_campaign(path.parent)
+    said = [f.what for f in check_campaign(campaign, path.parent) if f.check == "missing"]
+    assert any("Y_v|v|" in what for what in said), said
 
 
 # -- the least added mass --------------------------------------------------------------------------

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import re
 from collections.abc import Iterator
 
 import numpy as np
@@ -104,6 +106,19 @@ def a_run_that_keeps_what_the_others_exclude(evidence: Evidence, rule: Rule) -> 
                 what = f"run {odd['run_id'].iloc[0]} uses {load}, which the {without.sum()} other {test} runs of its "
                 what += "file exclude"
                 yield rule.finding(str(file), rows_of(odd), ["exclude", load], what)
+
+
+@check("symmetry")
+def ranges_of_two_sides(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
+    """A range of drift, roll or yaw in [source.within] that is another to port than to starboard."""
+    campaign = evidence.campaign
+    for source in campaign.header.source if campaign is not None else ():
+        for name, (low, high) in source.within.items():
+            sideways = re.match(r"(beta|p|r|vdot|pdot|rdot)\b", name.replace("_", " ")) is not None
+            if sideways and low < 0.0 < high and not math.isclose(-low, high, rel_tol=1e-6):
+                what = f"{name} from {low:g} to {high:g} in {source.files}: runs to one side count and their mirror "
+                what += "images on the other do not"
+                yield rule.finding("campaign.toml", [], [f"source.within.{name}"], what)
 
 
 @check("rows")
