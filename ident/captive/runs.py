@@ -23,7 +23,7 @@ from ident.captive.left_behind import left_behind
 from ident.captive.moving import axes_of, moment_axes_of, moving_body, refuse_tables
 from ident.captive.oscillation import states
 from ident.captive.quantities import Column, owner
-from ident.captive.readers.opening import matching, on_coarser_grids, open_sheet, reader_of
+from ident.captive.readers.opening import matching, on_coarser_grids, open_sheet, reader_of, tables_of
 from ident.captive.readers.sheet import Sheet
 from ident.captive.readers.sheet_columns import columns_of
 from ident.captive.readers.times import unit_of
@@ -82,9 +82,10 @@ def source_runs(
     paths = matching(folder, source)
     tables: list[pd.DataFrame] = []
     uses = Uses(source, str(folder / "campaign.toml"))
-    read = spread(_read, ((folder, path, source, header) for path in paths))
-    for done in range(len(paths)):
-        tell(f"reading {source.files}", done, len(paths))
+    jobs = list(_jobs(folder, paths, source, header))
+    read = spread(_read, iter(jobs))
+    for done in range(len(jobs)):
+        tell(f"reading {source.files}", done, len(jobs))
         table, reduced, refused, used = next(read)
         uses.add(used)
         gathered.reduced += reduced
@@ -94,14 +95,26 @@ def source_runs(
             tables.append(table)
     if paths and not gathered.refused:
         uses.refuse()
-    tell(f"reading {source.files}", len(paths), len(paths))
+    tell(f"reading {source.files}", len(jobs), len(jobs))
     gathered.tables += tables
     gathered.inputs += [p for path in paths for p in (path, *on_coarser_grids(path, folder, source))]
     return tables
 
 
+def _jobs(
+    folder: Path, paths: list[Path], source: Source, header: CampaignFile
+) -> Iterator[tuple[Path, Path, Source, CampaignFile, str]]:
+    """What is read: each file, or each table of a file where ``table`` stands for several; their name then."""
+    for path in paths:
+        idle = idle_keys(source, reader_of(path, source))
+        names = tables_of(path, source) if source.table and not idle else [source.table]
+        for name in names:
+            many = "" if name == source.table else name
+            yield folder, path, source.model_copy(update={"table": name}) if many else source, header, many
+
+
 def _read(
-    folder: Path, path: Path, source: Source, header: CampaignFile
+    folder: Path, path: Path, source: Source, header: CampaignFile, of_many: str = ""
 ) -> tuple[pd.DataFrame, list[Reduced], NotRising | None, Uses]:
     """The runs of one file, its reduced histories, and what it made use of; or why its time stamps refuse it."""
     where = str(folder / "campaign.toml")
@@ -110,7 +123,9 @@ def _read(
     if idle:
         text = f"nothing: the reader {reader_of(path, source)} of {path.name} does not look at it"
         raise InputError(f"{where}, key source.{idle[0]}", "declared", text)
-    stated = constants(folder, path, source)
+    stated = constants(folder, path, source, of_many)
+    if of_many and source.rows == "history":
+        stated[0].setdefault("run_id", f"{path.stem}/{of_many}")
     name = path.relative_to(folder).as_posix()
     reduced: list[Reduced] = []
     try:

@@ -206,7 +206,7 @@ class Source(Data):
     ignore : Headers (with ``*``) to leave out.
     names : Columns in order, of files without a header.
     header_pattern : Regular expression that finds the header line.
-    table : Worksheet, struct, group or zone of a file that holds several.
+    table : Worksheet, struct, group or zone of a file that holds several; each that fits where it has `*` or `?`.
     widths : Characters of each column, where numbers touch.
     units_row : Whether the row below the header holds the units.
     delimiter : Where it cannot be found out.

@@ -69,8 +69,16 @@ def outside_excluded(table: pd.DataFrame, source: Source, where: str) -> pd.Data
     return out
 
 
-def constants(folder: Path, path: Path, source: Source) -> tuple[dict[str, str], dict[str, float], set[str]]:
+def constants(
+    folder: Path, path: Path, source: Source, of_many: str = ""
+) -> tuple[dict[str, str], dict[str, float], set[str]]:
     """What the campaign says of every run of a file: ``constants``, and ``match`` on its path.
+
+    Parameters
+    ----------
+    folder : The campaign's.
+    path, source : A file of one ``[[source]]``.
+    of_many : The table that is read, where ``table`` stands for several; behind the path for ``match``.
 
     Returns
     -------
@@ -87,7 +95,7 @@ def constants(folder: Path, path: Path, source: Source) -> tuple[dict[str, str],
     where = f"{toml}, key source.constants"
     given: dict[str, Any] = dict(source.constants)
     if source.match:
-        name = path.relative_to(folder).as_posix()
+        name = path.relative_to(folder).as_posix() + (f"/{of_many}" if of_many else "")
         hit = search(source.match, name)
         if not hit:
             raise InputError(f"{folder / 'campaign.toml'}, key source.match", f"{name!r} does not match", source.match)

@@ -50,6 +50,15 @@ def with_units(names: Sequence[str], units: Sequence[str], source: Source) -> li
     return named
 
 
+class NoSuchTable(InputError):
+    """A table that a file does not hold; ``names`` are those that it does."""
+
+    def __init__(self, path: Path, what: str, table: str, names: Sequence[str]) -> None:
+        shown = ", ".join(map(repr, names))[:200]
+        super().__init__(f"{path}, key source.table", f"no {what} {table!r}", shown or "none is there")
+        self.names = list(names)
+
+
 def chosen(path: Path, names: Sequence[str], source: Source, what: str) -> str:
     """Which table (worksheet, group, variable) of a file to read.
 
@@ -60,8 +69,7 @@ def chosen(path: Path, names: Sequence[str], source: Source, what: str) -> str:
     """
     if source.table:
         if source.table not in names:
-            shown = ", ".join(map(repr, names))[:200]
-            raise InputError(f"{path}, key source.table", f"no {what} {source.table!r}", shown or "none is there")
+            raise NoSuchTable(path, what, source.table, names)
         return source.table
     if len(names) != 1:
         text = f"table = '...' in [[source]]: one of {', '.join(map(repr, names))[:200]}" if names else f"a {what}"

@@ -7,6 +7,7 @@ import os
 import re
 from pathlib import Path
 
+from ident.captive.readers.arrays import NoSuchTable
 from ident.captive.readers.hdf5 import open_hdf5, open_netcdf
 from ident.captive.readers.labview import open_lvm, open_tdms
 from ident.captive.readers.matlab import open_matlab
@@ -194,6 +195,27 @@ def open_sheet(path: Path, source: Source) -> Sheet:
     if reader in ("table", "starccm", "columns") and su2_header(head(path, source.encoding).text):
         return open_su2(path, as_read, OPENERS[reader])
     return OPENERS[reader](path, as_read)
+
+
+def tables_of(path: Path, source: Source) -> list[str]:
+    """The tables of a file that ``source.table`` names: one, or each that fits a name with ``*`` or ``?``.
+
+    Raises
+    ------
+    InputError
+        For a name that none of them fits, or anything the reader of its format refuses.
+    """
+    if not re.search(r"[*?]", source.table) or path.is_dir():
+        return [source.table]
+    try:
+        open_sheet(path, source)
+    except NoSuchTable as error:
+        form = re.escape(source.table).replace(r"\*", ".*").replace(r"\?", ".")
+        fitting = [name for name in error.names if re.fullmatch(form, name, re.DOTALL)]
+        if not fitting:
+            raise
+        return fitting
+    return [source.table]
 
 
 def inputs(path: Path) -> list[Path]:
