@@ -131,7 +131,8 @@ SLIPS = {
     "a thrust deduction of twice": (
         "bb2", "self_propulsion.csv", times("t", 1.0 / KNOT), "proportion", "warning", "t = 0."),
     "a torque of rpm": ("remus100", "published.csv", put("P01-Kprop", "value", "-1.62"), "proportion", "error", "K_nn"),
-    "digits exchanged": ("remus100", "published.csv", put("P01-Nura", "value", "1.39"), "proportion", "error", "N_ura"),
+    "digits exchanged": (
+        "remus100", "published.csv", put("P01-Nura", "value", "1.39"), "proportion", "warning", "N_ura"),
     "half of every added mass": (
         "remus100", "published.csv", times("value", 0.55), "added_mass", "warning", "geometric mean"),
     "half of one plane's": ("suboff", "published.csv", times("value", KNOT), "added_mass", "warning", "geometric mean"),

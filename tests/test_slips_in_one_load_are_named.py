@@ -188,7 +188,11 @@ def test_the_rows_name_coefficients_that_are_there():
 
 def test_a_quotient_is_judged_beyond_its_errors():
     row = Proportion(("a",), ("b",), 0.1, 1.0, "warning", (), False, "made")
-    limits = {"errors": 3.0, "gross": 3.0}
+    limits = {"errors": 3.0, "gross": 3.0, "near": 1.35}
+    strict = replace(row, severity="error")
+    cases = ((1.0, ""), (1.3, "warning"), (1.4, "error"), (0.08, "warning"), (0.07, "error"), (-0.5, "error"))
+    for value_, expected in cases:
+        assert beyond(strict, (value_, 0.0), (1.0, 0.0), limits) == expected, value_
     for value_, expected in ((0.5, ""), (1.5, "warning"), (4.0, "error"), (-0.5, "warning"), (0.01, "error")):
         assert beyond(row, (value_, 0.0), (1.0, 0.0), limits) == expected, value_
     assert beyond(row, (1.5, 0.3), (1.0, 0.0), limits) == ""

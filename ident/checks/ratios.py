@@ -160,7 +160,8 @@ def coefficients_beside_each_other(evidence: Evidence, rule: Rule) -> Iterator[F
 def beyond(row: Proportion, value: tuple[float, float], base: tuple[float, float], limits: Mapping[str, float]) -> str:
     """Severity of a quotient beyond its limits by more than its errors explain; nothing inside.
 
-    An error where it is beyond by the factor ``gross`` too.
+    An error where it is beyond by the factor ``gross`` too; where a row is an error, a warning within
+    the factor ``near``.
     """
     if not base[0] or not all(map(math.isfinite, (*value, *base))):
         return ""
@@ -178,5 +179,7 @@ def beyond(row: Proportion, value: tuple[float, float], base: tuple[float, float
         return ""
     edge = row.low if quotient < row.low else row.high
     away = quotient / edge if edge else math.inf
+    if row.severity == "error" and 1.0 / limits["near"] <= away <= limits["near"]:
+        return "warning"
     within = 1.0 / limits["gross"] <= away <= limits["gross"]
     return row.severity if within or away <= 0.0 or not edge else "error"
