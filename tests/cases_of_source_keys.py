@@ -128,6 +128,11 @@ SOURCE_CASES: dict[str, tuple[dict[str, Any], dict[str, Any], dict[str, Any]]] =
     "Reduction.motion": (of(SWAY), reduced(SWAY, motion="heave"), {"files": {"sway.csv": sway()}}),
     "Reduction.frequency_hz": (of(SWAY), reduced(SWAY, frequency_hz=0.2), {"files": {"sway.csv": sway()}}),
     "Reduction.amplitude": (of(SWAY), reduced(SWAY, amplitude=0.4), {"files": {"sway.csv": sway()}}),
+    "Reduction.path": (
+        reduced(SWAY, motion="yaw"),
+        reduced(SWAY, motion="yaw", path="straight"),
+        {"files": {"sway.csv": sway()}},
+    ),
     "Reduction.phase_deg": (of(SWAY), reduced(SWAY, phase_deg=30.0), {"files": {"sway.csv": sway()}}),
     "Reduction.delay_s": (of(SWAY), reduced(SWAY, delay_s={"Y": 0.05}), {"files": {"sway.csv": sway()}}),
 }

@@ -59,6 +59,7 @@ KEYS: dict[str, dict[str, Any]] = {
             "amplitude": 0.5,
             "phase_deg": 30.0,
             "delay_s": {"Y": 0.1},
+            "path": "straight",
         }.items()
     },
     **{

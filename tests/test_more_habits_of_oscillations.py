@@ -204,3 +204,72 @@ def test_a_moment_without_incidence_is_a_part_of_the_weight_times_the_length(tmp
     (tmp_path / "runs.csv").write_text("\n".join(["alpha_deg,Z_N,M_Nm", *rows]) + "\n", "utf-8")
     found = [f for f in check_campaign(read_campaign(tmp_path), tmp_path) if f.check == "hydrostatic"]
     assert [f.what[0] for f in found] == expected
+
+
+# -- a body that swings across its path -----------------------------------------------------------
+
+SWING = 0.1
+# Y of sway velocity, yaw rate and both accelerations; N the same [SI], of a boat at 5 m/s.
+YAWING = {"v": (-3.0e5, -2.0e6), "r": (9.0e5, -6.0e6), "vdot": (-9.0e5, -1.0e5), "rdot": (-1.0e5, -2.0e8)}
+
+
+def swung(straight: bool, motion: str = "yaw") -> pd.DataFrame:
+    """Yaw, or pitch by the same law with the sign of w, about an axis that is towed straight or along the path."""
+    time = np.arange(0.0, 80.0, 0.05)
+    angle = SWING * np.sin(OMEGA * time)
+    rate, change = SWING * OMEGA * np.cos(OMEGA * time), -SWING * OMEGA**2 * np.sin(OMEGA * time)
+    across = -1.0 if motion == "yaw" else 1.0
+    state = {"r": rate, "rdot": change, "v": 0.0 * time, "vdot": 0.0 * time}
+    if straight:
+        state |= {"v": across * 5.0 * np.sin(angle), "vdot": across * 5.0 * np.cos(angle) * rate}
+    loads = [sum(YAWING[k][c] * state[k] for k in state) for c in (0, 1)]
+    noise = np.random.default_rng(2).standard_normal((3, time.size))
+    force, moment = ("Y_N", "N_Nm") if motion == "yaw" else ("Z_N", "M_Nm")
+    table = pd.DataFrame({"time_s": time, "X_N": X + 10 * noise[0], force: loads[0] + 10 * noise[1]})
+    return table.assign(**{moment: loads[1] + 10 * noise[2], "displacement_rad": angle})
+
+
+def yawed(folder, table: pd.DataFrame, path: str, angles: str = "flight", motion: str = "yaw"):
+    across = {b: 5.0 * math.sin(math.radians(b)) for b in (-8, -4, 0, 4, 8)}
+    rows = [f"d{b},{b},{X},{YAWING['v'][0] * v},{YAWING['v'][1] * v}\n" for b, v in across.items()]
+    steady = CONSTANTS.replace('beta = "0 deg"\n', "") + 'test = "drift_horizontal"\nrel_sigma = 0.05\n'
+    reduction = REDUCTION.replace("sway", motion) + (f'path = "{path}"\n' if path else "")
+    frame = f'x = "forward"\ny = "starboard"\nz = "down"\nangles = "{angles}"'
+    both = history("run.csv", "", CONSTANTS, reduction) + f'[[source]]\nfiles = "drift.csv"\n{steady}'
+    campaign(folder, both, frame=frame)
+    table.to_csv(folder / "run.csv", index=False)
+    (folder / "drift.csv").write_text("run_id,beta_deg,X_N,Y_N,N_Nm\n" + "".join(rows), "utf-8")
+    done = read_campaign(folder)
+    swings = done.runs[done.runs["file"] == "run.csv"]
+    return done, swings.set_index(swings["run_id"].str[-2:])
+
+
+@pytest.mark.parametrize("angles", ["flight", "ittc"])
+@pytest.mark.parametrize("motion", ["yaw", "pitch"])
+def test_a_body_on_a_straight_path_stands_at_its_angle(tmp_path, motion, angles):
+    """At the ends of yaw v = -U sin psi, of pitch w = U sin theta; loads of angle and acceleration."""
+    done, at = yawed(tmp_path, swung(True, motion), "straight", angles, motion)
+    angle, sign = ("beta", -1.0) if motion == "yaw" else ("alpha", 1.0)
+    for end, side in (("+a", 1.0), ("-a", -1.0)):
+        assert at[angle][end] == pytest.approx(sign * side * SWING, rel=1e-9)
+        law = YAWING["v"][0] * sign * 5.0 * math.sin(side * SWING) - YAWING["rdot"][0] * side * SWING * OMEGA**2
+        assert at["Y" if motion == "yaw" else "Z"][end] == pytest.approx(law, rel=1e-3)
+    # Rate and acceleration across are one load at the other ends.
+    assert set(at.loc[["+v", "-v"], "exclude"]) == {"X Y Z K M N"}
+    assert at["reason"]["+v"].startswith(f"{motion} on a straight path")
+    assert not [f for f in check_campaign(done, tmp_path) if f.check in ("motion", "inertia_left_in", "inertia_sign")]
+
+
+def test_the_path_of_a_yawing_body_is_asked_for_where_its_force_is_that_of_drift(tmp_path):
+    asked = {}
+    for name, straight, path in (("silent", True, ""), ("along", False, ""), ("said", True, "tangent")):
+        done, _ = yawed(tmp_path / name, swung(straight), path)
+        asked[name] = [
+            f.severity for f in check_campaign(done, tmp_path / name) if "path" in f.what and f.check == "motion"
+        ]
+    assert asked == {"silent": ["warning"], "along": [], "said": []}
+
+
+def test_only_yaw_and_pitch_have_a_path(tmp_path):
+    with pytest.raises(InputError, match="no path: only a body that yaws or pitches"):
+        of_table(tmp_path, reduction=REDUCTION + 'path = "straight"\n')

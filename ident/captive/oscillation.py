@@ -34,14 +34,16 @@ _TURNS_GRAVITY = {"roll": HEEL, "pitch": TRIM}
 _STEADY_TEST = {"surge": "towing", "sway": "drift_horizontal", "heave": "drift_vertical"}
 
 
-def phase_row(theta: float) -> Array:
+def phase_row(theta: float, of_angle: bool = False) -> Array:
     """Weights of mean, in, out, in2, out2, in3, out3 in the load at phase ``theta``.
 
     The third harmonic in phase is left out: a load that is a function of the velocity and
-    linear in the acceleration has none, so at the ends of the acceleration it is noise.
+    linear in the acceleration has none, so at the ends of the acceleration it is noise. One that is a
+    function of the angle of the body as well has it (``of_angle``).
     """
     row = np.array([1.0, *(f(k * theta) for k in (1, 2, 3) for f in (math.sin, math.cos))])
-    row[HARMONICS.index("in3")] = 0.0
+    if not of_angle:
+        row[HARMONICS.index("in3")] = 0.0
     return row
 
 
@@ -113,9 +115,12 @@ def states(run: Oscillation, rule: Reduction, frame: Frame, ittc: bool, where: s
         if rule.motion in _TURNS_GRAVITY:
             swing = frame.sign(speed_name) * speed / omega
             state[_TURNS_GRAVITY[rule.motion]] = swing * math.sin(theta)
+        straight = rule.path == "straight"
+        if straight:
+            _across(state, rule.motion, frame.sign(speed_name) * speed / omega * math.sin(theta), ittc, at_velocity)
         usual = _STEADY_TEST.get(rule.motion, "rotating_arm")
         state["test"] = (run.state.get("test") or usual) if at_velocity else "acceleration"
-        weights = phase_row(theta)
+        weights = phase_row(theta, straight)
         for output in _LOADS:
             parts = run.harmonics.get(output)
             if parts is None or np.isnan(parts).all():
@@ -175,6 +180,26 @@ def _amplitudes(run: Oscillation, rule: Reduction, omega: float, where: str) -> 
         text = f"{acceleration_name} = -{speed_name} omega with omega = {omega:g} rad/s (displacement A sin)"
         raise InputError(where, wrong, text)
     return speed, -speed * omega
+
+
+def _across(state: dict[str, Any], motion: str, angle: float, ittc: bool, at_velocity: bool) -> None:
+    """Put a body that swings about an axis on a straight path into the flow at its angle.
+
+    At the ends of its rate it is along the path and v or w changes by U times the rate: what that does and what the
+    rate does are one load, which no coefficient is identified from.
+    """
+    if at_velocity:
+        state["exclude"] = " ".join(OUTPUTS)
+        state["reason"] = f"{motion} on a straight path: rate and cross acceleration are not told apart"
+        return
+    sign = -1.0 if ittc else 1.0
+    speed, alpha, beta = (float(np.nan_to_num(state.get(k, 0.0) or 0.0)) for k in ("U", "alpha", "beta"))
+    u, v, w = body_velocity(speed, alpha, sign * beta)
+    c, s = math.cos(angle), math.sin(angle)
+    u, v, w = (u * c + v * s, v * c - u * s, w) if motion == "yaw" else (u * c - w * s, v, w * c + u * s)
+    if speed > 0.0:
+        state["alpha"] = math.atan2(w, u)
+        state["beta"] = sign * math.asin(max(-1.0, min(1.0, v / speed)))
 
 
 def _move(state: dict[str, Any], name: str, velocity: float, frame: Frame, ittc: bool) -> None:

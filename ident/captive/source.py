@@ -84,6 +84,8 @@ class Reduction(Data):
         measures it.
     phase_deg : Phase of the displacement at time zero, A sin(2 pi f t + phase). Asked for where the
         clock does not start at zero and no column ``displacement`` measures it.
+    path : Of a body that yaws or pitches. ``tangent``: it stays along its path (pure yaw, pure pitch of a planar
+        motion mechanism). ``straight``: it swings about an axis that is towed straight, or stands in a stream.
     delay_s : Channel -> time by which it comes late (a filter, an acquisition), taken off: ``Y = 0.05``.
     """
 
@@ -95,6 +97,7 @@ class Reduction(Data):
     frequency_hz: Positive | None = None
     amplitude: Annotated[float, Field(gt=0, le=1e6)] | None = None
     phase_deg: Annotated[float, Field(ge=-360, le=360)] = 0.0
+    path: Literal["", "tangent", "straight"] = ""
     delay_s: dict[str, Annotated[float, Field(ge=-1e3, le=1e3)]] = Field(default_factory=dict)
 
     @model_validator(mode="after")
@@ -108,6 +111,8 @@ class Reduction(Data):
 
     def _nothing_is_idle(self) -> None:
         """Keys that this kind of reduction does not look at are refused."""
+        if self.path and self.motion not in ("yaw", "pitch"):
+            raise ValueError("no path: only a body that yaws or pitches may stand across its path")
         for key in ("motion", "frequency_hz", "amplitude", "phase_deg", "delay_s"):
             if self.kind != "oscillatory" and key in self.model_fields_set:
                 raise ValueError(f"no {key}: a {self.kind} test has no oscillation that it is of")

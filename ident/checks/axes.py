@@ -260,6 +260,56 @@ def same_rotation(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
             yield from _compared(evidence, rule, output, rate, slopes, rule.limits["turn"])
 
 
+# Rotation -> its acceleration, the angle of the flow it stands at on a straight path, its sign there, its force.
+_SWINGS = {"r": ("rdot", "beta", -1.0, "Y"), "q": ("qdot", "alpha", 1.0, "Z")}
+
+
+@check("motion")
+def swings_across_its_path(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
+    """Whether a force in phase with yaw or pitch is that of drift or incidence at the same angle."""
+    body, campaign = evidence.body, evidence.campaign
+    if body is None or campaign is None:
+        return
+    stated = {s.files for s in campaign.header.source if s.reduction is not None and s.reduction.path}
+    runs = evidence.runs[~evidence.runs["files"].isin(stated)] if "files" in evidence.runs else evidence.runs
+    for rate, (acceleration, angle, sign, force) in _SWINGS.items():
+        still = evidence.runs[_still(evidence.runs) & kept(evidence.runs, force)]
+        slope, _ = _slope(
+            _sweep(still, _TEST_OF[angle], angle), angle, force, body, math.radians(rule.limits["widest"])
+        )
+        if not math.isfinite(slope) or slope == 0.0:
+            continue
+        for file, group in _cycles(runs, rate, acceleration, force).groupby("file", sort=False):
+            size = 0.5 * body.density * group["U"] ** 2 * body.length**2
+            share = (group["in_phase"] / size / (sign * slope * group["angle"])).median()
+            if share > rule.limits["across"]:
+                what = f"does the body stay along its path? {force} in phase with the angle is {share:.2g} of that of "
+                what += f"{angle} at the same angle, as where it swings about an axis that is towed straight or stands "
+                what += "in a stream; path in [source.reduction] says it"
+                yield rule.finding(str(file), rows_of(group), [force], what)
+
+
+# Test over each angle of the flow.
+_TEST_OF = {angle: test for test, (angle, _, _) in _PLANES.items()}
+
+
+def _cycles(runs: pd.DataFrame, rate: str, acceleration: str, force: str) -> pd.DataFrame:
+    """Cycles of an oscillation about one axis with way on: file, row, U, amplitude of the angle, force in phase."""
+    name = runs["run_id"].astype(str)
+    wanted = ["file", "row", "U", rate, acceleration, force]
+    at = {end: runs[name.str.endswith(end)].set_index(name[name.str.endswith(end)].str[:-2])[wanted] for end in _ENDS}
+    other, fast = at["-a"][[force]].add_suffix("_other"), at["+v"][[rate]].add_suffix("_fast")
+    both = at["+a"].join(other, how="inner").join(fast, how="inner")
+    both = both[(both[acceleration].fillna(0.0) != 0.0) & (both[f"{rate}_fast"].fillna(0.0) != 0.0) & (both["U"] > 0.0)]
+    # A = (A w)^2 / (A w^2); the displacement is positive where the acceleration is negative.
+    angle = -(both[f"{rate}_fast"] ** 2) / both[acceleration]
+    return both.assign(angle=angle, in_phase=0.5 * (both[force] - both[f"{force}_other"]))
+
+
+# Instants of a cycle that tell its angle.
+_ENDS = ("+v", "+a", "-a")
+
+
 def _slope_of_turn(group: pd.DataFrame, output: str, body: Body, widest: float, odd: bool) -> tuple[float, float]:
     """Slope of a load over the turn, prime form with 1/2 rho U^2, and its standard error; NaN where there is none."""
     near = group[kept(group, output) & (group["turn"].abs() <= widest)]

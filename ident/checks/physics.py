@@ -214,13 +214,22 @@ def _apparent_inertia(runs: pd.DataFrame) -> Iterator[tuple[str, str, pd.DataFra
             yield str(file), acceleration, group, -float(x @ y / (x @ x))
 
 
+# Rounding of an angle [rad].
+_SAME_ANGLE = 1e-6
+
+
 def _of_acceleration(runs: pd.DataFrame, acceleration: str, output: str) -> pd.Series:
     """A load less what the opposed instants of an oscillation have in common; NaN where resistance is in it."""
     cycle = runs["file"].astype(str) + "/" + runs["run_id"].astype(str).str.extract(r"^(.*)[+-]a$")[0]
     opposed = cycle.notna() & (cycle.groupby(cycle).transform("size") == 2)
     load = runs[output] - runs.groupby(cycle)[output].transform("mean").where(opposed, 0.0)
     way = (acceleration == "udot") & (runs["U"].fillna(0.0) > 0.0) & ~opposed
-    return load.mask(way)
+    if not opposed.any():
+        return load.mask(way)
+    # A body that swings about an axis on a straight path has the load of its angle in it.
+    ends = runs.loc[opposed, ["alpha", "beta"]].fillna(0.0).groupby(cycle[opposed])
+    swung = ((ends.transform("max") - ends.transform("min")) > _SAME_ANGLE).any(axis=1)
+    return load.mask(way | swung.reindex(runs.index, fill_value=False))
 
 
 @check("inertia_sign")
