@@ -347,7 +347,10 @@ def _through_others(j: np.ndarray, value: np.ndarray, i: int) -> float:
     """A parabola through the four points nearest to one of them, at it; a straight line through three."""
     near = np.argsort(np.abs(j - j[i]), kind="stable")
     near = near[near != i][:4]
-    return float(np.polyval(np.polyfit(j[near] - j[i], value[near], 2 if len(near) > 3 else 1), 0.0))
+    apart = j[near] - j[i]
+    # Advances that are one to all digits leave a mean.
+    powers = np.vander(apart / (np.abs(apart).max() or 1.0), 3 if len(near) > 3 else 2)
+    return float(np.linalg.lstsq(powers, value[near], rcond=None)[0][-1])
 
 
 @check("open_water")
