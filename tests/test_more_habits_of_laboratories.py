@@ -388,3 +388,13 @@ def test_a_row_of_units_that_is_not_declared_names_the_key(tmp_path, unit):
 def test_columns_parted_by_another_mark_are_called_so(tmp_path):
     with pytest.raises(InputError, match=r"one column, and 3 times '\|'"):
         read(tmp_path, "beta_deg|X_N|Y_N|N_Nm\n2|1|2|3\n", tidy())
+
+
+@pytest.mark.parametrize(("again", "words"), [(0.0, "one run a file"), (None, "rate_hz")])
+def test_runs_below_each_other_are_not_asked_for_a_rate(tmp_path, again, words):
+    """A second run steps back once; stamps of too few digits repeat."""
+    time = np.concatenate([TIME, TIME]) if again is not None else np.floor(TIME)
+    text = "time_s,X_N,Y_N,N_Nm\n" + "".join(f"{t!r},1.0,2.0,3.0\n" for t in time.tolist())
+    (tmp_path / "run.csv").write_text(text, "utf-8")
+    with pytest.raises(InputError, match=words):
+        reduced(tmp_path, "run.csv")

@@ -59,6 +59,9 @@ class NotRising(InputError):
 
     def __init__(self, channels: Channels, clock: Clock, at: int, stamp: str) -> None:
         text = "a time that rises; or rate_hz in [source.reduction] where stamps have too few digits"
+        if not clock.repeats:
+            # Too few digits make stamps that repeat, none that step back.
+            text = "a time that rises: one run a file, and a restart without the steps that it repeats"
         super().__init__(f"{channels.path}, data row {at + 1}, column time", stamp, text)
         self.file, self.row = channels.path.name, at + 1
         self.clock, self.first_row = clock, channels.first_row
