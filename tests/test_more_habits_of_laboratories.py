@@ -398,3 +398,12 @@ def test_runs_below_each_other_are_not_asked_for_a_rate(tmp_path, again, words):
     (tmp_path / "run.csv").write_text(text, "utf-8")
     with pytest.raises(InputError, match=words):
         reduced(tmp_path, "run.csv")
+
+
+@pytest.mark.parametrize("units_row", [False, True])
+def test_names_that_a_spreadsheet_wrapped(tmp_path, units_row):
+    names = [("beta", "deg"), ("X", "N"), ("Y", "N"), ("N", "N m")]
+    header = ",".join(f'"{n}\nof the hull"' if units_row else f'"{n}\n[{u}]"' for n, u in names)
+    text = table(header + ("\n" + ",".join(u for _, u in names) if units_row else ""))
+    named = "\n".join(f'"{n} of the hull" = "{n}"' for n, _ in names) if units_row else ""
+    assert_values(read(tmp_path, text, tidy("units_row = true" if units_row else "", named)))

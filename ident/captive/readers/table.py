@@ -25,6 +25,8 @@ from sim.files.errors import InputError
 Array = NDArray[np.float64]
 # Rows at the end of a history that may lack cells: what a run that is still being written leaves.
 _MOST_UNFINISHED = 10
+# Lines that the names of a table may go over.
+_MOST_WRAPPED = 40
 _NO_DATA = "; skip = '...' in [[source]] leaves out lines that are no data"
 
 
@@ -139,6 +141,7 @@ def open_csv(path: Path, source: Source) -> Sheet:
         For a file without header, an unclosed quote, an ambiguous number, a column twice.
     """
     first, delimiter = _below_title(path, source)
+    first = _whole_names(first)
     dialect = sniff(path, first, delimiter, source.decimal, source.thousands)
     where = f"{path}, row {first.rows[0]} (header)"
     header = dialect.cells(first.text[0], where)
@@ -166,6 +169,16 @@ def open_csv(path: Path, source: Source) -> Sheet:
         header = [f"{name} [{unit.strip('[]()')}]" if unit else name for name, unit in zip(header, given, strict=True)]
     sheet = _text_sheet(path, source, dialect, header, first, skip)
     return replace(sheet, spacers=spacers)
+
+
+def _whole_names(first: Lines) -> Lines:
+    """The first lines with names in one, where a quoted name goes over several, as spreadsheets wrap them."""
+    at = 1
+    while at < min(len(first.text), _MOST_WRAPPED) and " ".join(first.text[:at]).count('"') % 2:
+        at += 1
+    if at == 1 or " ".join(first.text[:at]).count('"') % 2:
+        return first
+    return Lines(first.rows[at - 1 :], [" ".join(first.text[:at]), *first.text[at:]])
 
 
 def _nameless(
