@@ -188,3 +188,9 @@ def test_an_su2_history_is_its_last_iterations_whatever_its_columns_are_called(t
     rule = '[source.reduction]\nkind = "steady"\nrate_hz = 20.0\n'
     campaign(tmp_path, history("run.csv", made[keys], reduction=rule))
     assert_means(read_campaign(tmp_path).runs)
+
+
+def test_a_title_alone_makes_no_tecplot_file(tmp_path):
+    rows = ["  ".join(map(repr, row)) for row in RECORD.tolist()]
+    (tmp_path / "run.txt").write_text("\n".join(["TITLE = run 7", "Time  Fx  Fy  Mz", *rows]), "utf-8")
+    assert_means(reduced(tmp_path, "run.txt", 'header_pattern = "^Time"\n' + NAMED.format("Time", "Fx", "Fy", "Mz")))

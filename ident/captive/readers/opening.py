@@ -146,8 +146,7 @@ def reader_of(path: Path, source: Source) -> str:
     said = next((reader for mark, reader in _BEGIN.items() if start.startswith(mark)), _ENDINGS.get(path.suffix, ""))
     if said:
         return "matlab" if said == "hdf5" and path.suffix == ".mat" else said
-    first = next(iter(head(path, source.encoding, skip=source.skip).text), "")
-    if re.match(r"(?i)\s*(TITLE|VARIABLES)\s*=", first):
+    if _is_tecplot(head(path, source.encoding, COMMENTS, source.skip).text):
         return "tecplot"
     if source.header_pattern and source.delimiter in (",", ";", "\t"):
         return "table"
@@ -159,14 +158,19 @@ def reader_of(path: Path, source: Source) -> str:
         return "fluent"
     if su2_header(lines):
         return "su2"
-    if re.match(r"(?i)\s*(TITLE|VARIABLES)\s*=", first):
-        return "tecplot"
     if source.patterns or re.search(r"\bMonitor\b", first):
         return "starccm"
     if first and not re.search(r"[A-Za-z]", re.sub(r"[eEdD][+-]?\d", "", first)):
         return "columns"
     delimited = any(mark in first for mark in ",;\t")
     return "table" if delimited or path.suffix == ".csv" else "columns"
+
+
+def _is_tecplot(lines: list[str]) -> bool:
+    """Whether lines begin as an ASCII file of Tecplot does: its variables, perhaps below a title."""
+    first = lines[0] if lines else ""
+    named = any(re.match(r"(?i)\s*VARIABLES\s*=", line) for line in lines)
+    return named and re.match(r"(?i)\s*(TITLE|VARIABLES)\s*=", first) is not None
 
 
 def open_sheet(path: Path, source: Source) -> Sheet:
