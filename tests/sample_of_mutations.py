@@ -107,19 +107,20 @@ def _files_kept() -> None:
     """A file that did not change, under a campaign whose keys did not, is not read again."""
     read, kept = runs._read, {}
 
-    def once(folder, path, source, header):
+    def once(folder, path, source, header, of_many=""):
         if path.is_dir():
-            return read(folder, path, source, header)
+            return read(folder, path, source, header, of_many)
         key = (
             str(path),
             hashlib.sha256(path.read_bytes()).digest(),
             source.model_dump_json(),
             header.model_dump_json(),
+            of_many,
         )
         if key not in kept:
             if len(kept) > 2000:
                 kept.clear()
-            kept[key] = read(folder, path, source, header)
+            kept[key] = read(folder, path, source, header, of_many)
         table, *rest = kept[key]
         return (table.copy(), *rest)
 
