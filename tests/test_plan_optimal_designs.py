@@ -19,11 +19,13 @@ import pytest
 from click.testing import CliRunner
 
 from ident.captive.campaign import read_campaign
+from ident.captive.campaign_file import MotionPoint
 from ident.cli import main
 from ident.identification.identify import identify
 from ident.identification.solver import Solver
 from ident.planning.candidates import Facility, Levels, planned_tests, read_facility
 from ident.planning.design import Design, d_optimal, fewest_runs
+from ident.planning.matrix import matrix
 from ident.planning.plan import make_plan, planned_campaign
 from sim.boat.catalogue import OUTPUTS
 from sim.boat.forces import multiplier
@@ -233,6 +235,22 @@ def test_the_matrix_can_be_run_and_read_back(bb2_plan, campaign, tmp_path):
     planned = [n for n in bb2_plan.needs if n.planned == n.planned]
     assert len(planned) > 100
     assert [n for n in planned if (n.name, n.part, n.point) not in places] == []
+
+
+def test_a_matrix_of_a_campaign_with_a_pivot_is_of_its_motion(bb2_plan, campaign):
+    """v_P = v_O + omega x r_P: what the pivot does, and turned back the runs of the plan again."""
+    pivot = MotionPoint(x_m=-6.0, y_m=0.0, z_m=1.0, about="pivot")
+    moved = replace(campaign, header=campaign.header.model_copy(update={"motion_point": pivot}))
+    there, here = matrix(bb2_plan.runs, moved), bb2_plan.matrix
+    turns = here[["p_radps", "q_radps", "r_radps"]].fillna(0.0).ne(0.0).any(axis=1) & (here["U_mps"] > 0.0)
+    pd.testing.assert_frame_equal(there[~turns], here[~turns])
+    # Axes of the campaign: x aft, z up; 6 m ahead of the origin, r_P = (6, 0, -1) in the program's.
+    others = here[["p_radps", "q_radps", "alpha_deg"]].fillna(0.0).ne(0.0).any(axis=1)
+    yaw = turns & ~others
+    drift, rate, speed = np.radians(here["beta_deg"].fillna(0.0)), -here["r_radps"], here["U_mps"]
+    across = np.degrees(np.arctan2(speed * np.sin(drift) + 6.0 * rate, speed * np.cos(drift)))
+    assert yaw.sum() > 3
+    np.testing.assert_allclose(there["beta_deg"][yaw], across[yaw], atol=1e-9)
 
 
 def test_plan_command(tmp_path):

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
-from ident.captive.campaign import Campaign, to_full_scale, turn
+from ident.captive.campaign import Campaign, at_origin, to_full_scale, turn
 from ident.captive.run_table import STATES
 from ident.output import html_table, whole
 from ident.text import on_screen
@@ -155,8 +155,14 @@ def _worst(values: Iterable[float]) -> float | None:
 
 def matrix(runs: pd.DataFrame, campaign: Campaign) -> pd.DataFrame:
     """The runs of a plan in the campaign's frame and scale, units in the header."""
-    frame = campaign.header.frame.frame
-    table = to_full_scale(turn(runs, frame, campaign.header.frame.angles), 1.0 / campaign.header.scale.ratio)
+    frame, pivot = campaign.header.frame.frame, campaign.header.motion_point
+    table = to_full_scale(runs, 1.0 / campaign.header.scale.ratio)
+    if pivot is not None:
+        # A rotation without way on is about the origin whatever the pivot.
+        way = table["U"] > 0.0
+        there = [-x for x in frame.vector([pivot.x_m, pivot.y_m, pivot.z_m])]
+        table = pd.concat([at_origin(table[way], there), table[~way]]).sort_index()
+    table = turn(table, frame, campaign.header.frame.angles)
     out = pd.DataFrame(
         {"run_id": [f"P{i + 1:03d}" for i in range(len(table))], "test": table["test"], "part": table["part"]}
     )
