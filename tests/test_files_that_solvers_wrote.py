@@ -74,6 +74,18 @@ def test_plots_with_an_abscissa_each_are_joined_where_all_have_one(tmp_path):
     np.testing.assert_allclose(run[COLUMNS].astype(float), SERIES[::2].mean(axis=0), rtol=1e-9)
 
 
+def test_plots_that_are_cut_or_have_a_cell_too_many(tmp_path):
+    head = '"Iteration","X Monitor: X (N)","Iteration","Y Monitor: Y (N)"\n'
+    rows = [f"{i},{x!r},{i},{y!r}" for i, (x, y) in enumerate(SERIES[:, :2].tolist())]
+    patterns = "[source.patterns]\n'^Iteration$' = \"time [s]\"\n'^X ' = \"X\"\n'^Y ' = \"Y\"\n"
+    (tmp_path / "run.csv").write_text(head + "\n".join(rows) + "\n400,5.0,400,-1", "utf-8")
+    run = reduced(tmp_path, "run.csv", patterns).iloc[0]
+    np.testing.assert_allclose(run[["X", "Y"]].astype(float), MEANS[:2], rtol=1e-9)
+    (tmp_path / "run.csv").write_text(head + "\n".join([*rows[:7], rows[7] + ",4", *rows[8:]]) + "\n", "utf-8")
+    with pytest.raises(InputError, match="row 9: 5 cells"):
+        reduced(tmp_path, "run.csv", patterns)
+
+
 def test_su2_histories_with_padded_quotes_and_inner_iterations(tmp_path):
     head = '"Time_Iter","Outer_Iter","Inner_Iter",    "CFx"       ,   "CFy"  ,  "CMz"      '
     rows = []
@@ -143,6 +155,8 @@ def test_xy_plots_of_fluent_are_joined_where_all_curves_have_a_value(tmp_path):
     for name, column in zip(("fx", "fy", "mz"), SERIES.T.tolist(), strict=True):
         lines += [f'((xy/key/label "{name}")', *(f"{i}\t{v!r}" for i, v in enumerate(column)), ")", ""]
     (tmp_path / "run.xy").write_text("\n".join(lines), "utf-8")
+    assert_means(reduced(tmp_path, "run.xy", NAMED.format("Iteration", "fx", "fy", "mz")))
+    (tmp_path / "run.xy").write_text("\n".join([*lines[:-2], "400\t-7"]), "utf-8")
     assert_means(reduced(tmp_path, "run.xy", NAMED.format("Iteration", "fx", "fy", "mz")))
     (tmp_path / "run.xy").write_text("\n".join(lines).replace("\t", "\tx", 1), "utf-8")
     with pytest.raises(InputError, match=r"row 5: '0\\tx"):

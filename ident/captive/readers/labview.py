@@ -144,6 +144,9 @@ def _own_abscissae(path: Path, source: Source, header_row: int, dialect: Dialect
                 series = [{} for _ in names]
                 blank = [cell for cell in cells[2 * len(names) :] if cell]
                 continue
+            if any(cells[2 * len(names) + len(blank) :]):
+                most = f"at most {2 * len(names) + len(blank)}, as in the header"
+                raise InputError(f"{path}, row {row}", f"{len(cells)} cells", most)
             for k, channel in enumerate(series):
                 pair = cells[2 * k : 2 * k + 2]
                 if len(pair) < 2 or not any(pair):

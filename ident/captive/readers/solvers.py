@@ -55,6 +55,7 @@ def _open_xy(path: Path, source: Source) -> Sheet:
     """``(labels "Iteration" "fx")``, then a curve each: ``((xy/key/label "fx")``, pairs of numbers, ``)``."""
     names: list[str] = []
     curves: dict[str, dict[float, float]] = {}
+    text = ""
     for block in blocks(path, source.encoding, comments=("\0",), skip=source.skip):
         for row, line in zip(block.rows, block.text, strict=True):
             text = line.strip()
@@ -69,6 +70,9 @@ def _open_xy(path: Path, source: Source) -> Sheet:
                 if len(pair) != 2 or pair[0] is None or pair[1] is None:
                     raise InputError(f"{path}, row {row}", repr(text[:40]), "an abscissa and a number")
                 curves[list(curves)[-1]][pair[0]] = pair[1]
+    if curves and text != ")" and (last := curves[list(curves)[-1]]):
+        # Still being written, or cut: so may be its last number.
+        last.popitem()
     if not names or not curves:
         raise InputError(str(path), "no (labels ...) or no curve", "an XY plot file as Fluent writes it")
     return joined(path, [names[0], *curves], list(curves.values()), source, 2)
@@ -125,13 +129,18 @@ def open_plots(path: Path, source: Source, dialect: Dialect) -> Sheet:
         For a cell that is no number, or plots without a common abscissa.
     """
     lines: list[tuple[int, list[str]]] = []
+    ended = True
     for block in blocks(path, source.encoding, skip=source.skip):
         lines += [
             (row, dialect.cells(line, f"{path}, row {row}")) for row, line in zip(block.rows, block.text, strict=True)
         ]
+        ended = block.ended
     names = lines[0][1]
     plots: list[dict[float, float]] = [{} for _ in names[1::2]]
-    for row, cells in lines[1:]:
+    # A row without line end may be cut.
+    for row, cells in lines[1:] if ended else lines[1:-1]:
+        if any(cells[len(names) :]):
+            raise InputError(f"{path}, row {row}", f"{len(cells)} cells", f"at most {len(names)}, as in the header")
         for k, series in enumerate(plots):
             pair = cells[2 * k : 2 * k + 2]
             if len(pair) < 2 or not any(pair):
