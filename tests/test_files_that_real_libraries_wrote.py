@@ -165,6 +165,11 @@ def test_a_link_that_leads_nowhere_and_a_time_called_t(tmp_path):
             made[name] = values
             made[name].attrs["unit"] = unit
     assert_means(reduced(tmp_path, "run.h5", '[source.columns]\nt = "time"\n'))
+    with h5py.File(tmp_path / "run.h5", "a") as made:
+        made["K_Nm"] = h5py.ExternalLink("gone.h5", "/K")
+    with pytest.raises(InputError, match="K_Nm: a link that leads nowhere"):
+        reduced(tmp_path, "run.h5", '[source.columns]\nt = "time"\n')
+    assert_means(reduced(tmp_path, "run.h5", 'ignore = ["K_Nm"]\n[source.columns]\nt = "time"\n'))
 
 
 @pytest.mark.parametrize("name", ["run.nc", "run.h5"])

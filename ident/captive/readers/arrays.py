@@ -94,7 +94,7 @@ def of_one_length(path: Path, columns: dict[str, Any], source: Source) -> dict[s
     longest = max((len(v) for v in columns.values()), default=0)
     kept: dict[str, Any] = {}
     for name, values in columns.items():
-        meant = _is_quantity(name, source)
+        meant = is_quantity(name, source)
         if isinstance(values, np.ndarray) and values.dtype.kind == "c":
             if meant and np.abs(values.imag).max(initial=0.0) > 0.0:
                 raise InputError(f"{path}, {name[:60]}", "complex numbers", "the real ones of a time history")
@@ -112,7 +112,7 @@ def of_one_length(path: Path, columns: dict[str, Any], source: Source) -> dict[s
     return kept
 
 
-def _is_quantity(name: str, source: Source) -> bool:
+def is_quantity(name: str, source: Source) -> bool:
     """Whether a column is declared, or has the name of a quantity with its unit."""
     bare, unit = split(name)
     if ignored(name, source):

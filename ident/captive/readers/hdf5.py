@@ -8,11 +8,13 @@ from typing import Any
 import numpy as np
 
 from ident.captive.quantities import split
-from ident.captive.readers.arrays import array_sheet, chosen, needs, of_one_length, with_units
-from ident.captive.readers.sheet import Sheet
+from ident.captive.readers.arrays import array_sheet, chosen, is_quantity, needs, of_one_length, with_units
+from ident.captive.readers.sheet import Sheet, ignored
 from ident.captive.source import Source
 from sim.files.errors import InputError
 
+# A dataset that stands in another place or file, and is not there; one of flags.
+_LOST, _FLAGS = "a link that leads nowhere", "true or false"
 # Attributes by which HDF5 links datasets, which are no words or numbers.
 _OF_STRUCTURE = ("DIMENSION_LIST", "REFERENCE_LIST")
 
@@ -48,7 +50,10 @@ def open_hdf5(path: Path, source: Source) -> Sheet:
         raise InputError(str(path), f"not an HDF5 file: {str(error)[:100]}", "a whole file") from error
     refuse_objects(path, objects, bool(groups), source)
     name = chosen(path, list(groups), source, "group")
-    return _sheet(path, groups[name], source)
+    beside = [p.rpartition("/")[2] for p in objects if (p.rpartition("/")[0] or "/") == name]
+    # What is left out is still there to be named.
+    left_out = {key: (np.empty(0), "") for key in beside if ignored(key, source)}
+    return _sheet(path, groups[name] | left_out, source)
 
 
 def refuse_objects(path: Path, objects: dict[str, str], others: bool, source: Source) -> None:
@@ -67,7 +72,13 @@ def refuse_objects(path: Path, objects: dict[str, str], others: bool, source: So
     """
     meant = {source.table, *source.columns, *(split(h)[0] for h in source.columns)}
     for name, kind in objects.items():
-        if name.rpartition("/")[2] in meant or name in meant or not others:
+        key = name.rpartition("/")[2]
+        if key in meant or name in meant or is_quantity(key, source) or (not others and kind not in (_LOST, _FLAGS)):
+            if kind == _LOST:
+                text = f'the file that it leads to beside this one; or ignore = ["{key[:40]}"] in [[source]]'
+                raise InputError(f"{path}, {name[:60]}", kind, text)
+            if kind == _FLAGS:
+                raise InputError(f"{path}, {name[:60]}", kind, "numbers")
             if "x" in kind:
                 raise InputError(f"{path}, {name[:60]}", f"an array of {kind}", "vectors: a variable or a file a run")
             how = "columns as vectors: s = table2struct(t, 'ToScalar', true); save('run.mat', '-struct', 's')"
@@ -106,7 +117,7 @@ def _collect(h5py: Any, group: Any, name: str, groups: dict[str, Any], source: S
     for key, item in group.items():
         path = f"{name}/{key}".lstrip("/")
         if item is None:
-            # A link whose target is not there.
+            objects[path] = _LOST
             continue
         if isinstance(item, h5py.Group):
             if not key.startswith("#"):
@@ -132,6 +143,8 @@ def _collect(h5py: Any, group: Any, name: str, groups: dict[str, Any], source: S
             groups[path] = matrix
         elif item.dtype.kind in "iuf":
             objects[path] = " x ".join(map(str, item.shape))
+        if item.dtype.kind == "b":
+            objects[path] = _FLAGS
     if any(len(v) > 1 for v, _ in vectors.values()):
         groups[name or "/"] = vectors
 

@@ -63,7 +63,7 @@ def _inside(path: Path) -> str:
         with zipfile.ZipFile(path) as packed:
             names = packed.namelist()
             return "" if {"xl/workbook.xml", "content.xml"} & set(names) else ", ".join(names[:3])[:100]
-    except (zipfile.BadZipFile, OSError, ValueError):
+    except (zipfile.BadZipFile, OSError, ValueError, RuntimeError):
         return ""
 
 

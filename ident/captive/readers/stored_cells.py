@@ -57,8 +57,8 @@ def stored_cells(path: Path, sheet: str) -> Stored:
         return Stored(errors, frozenset(bare), frozenset(hidden))
     try:
         return _of_archive(path, sheet)
-    except (zipfile.BadZipFile, ElementTree.ParseError, ValueError):
-        # What reads the values says what is wrong with it.
+    except Exception:
+        # Archives fail in many ways: what reads the values says what is wrong with this one.
         return Stored()
 
 
