@@ -19,7 +19,7 @@ from ident.captive.campaign import read_campaign
 from ident.captive.run_table import run_table
 from ident.checks.check import check_campaign, evidence_of
 from ident.checks.findings import Body, Evidence, registered, rules
-from ident.checks.levels import one_level_off_the_grid
+from ident.checks.levels import one_level_off_the_grid, speeds_for_depths
 from ident.checks.rows import loads_that_fall_as_their_motion_grows
 from ident.checks.zeros import means_of_oscillations
 from sim.boat.vehicle import load_vehicle
@@ -236,6 +236,21 @@ def test_one_level_in_the_place_of_another_is_named():
     # Two series of their own are a plan, not a slip; of two series nobody knows which is odd.
     assert grid({7: 21.0, 11: 20.0}) == []
     assert grid({3: 21.0}, (1.0, 2.0)) == []
+
+
+@pytest.mark.parametrize(("depth", "named"), [(3.333, 1), (3.0, 0)])
+def test_round_speeds_may_be_depths_elsewhere(place, depth, named):
+    campaign = read_campaign(place("starter"))
+    scale = campaign.header.scale.ratio
+    runs = run_table(
+        {
+            "run_id": ["a", "b", "c"], "test": "towing", "part": "hull", "file": ["t.csv", "t.csv", "d.csv"],
+            "U": [1.5 * scale**0.5, 1.5 * scale**0.5, depth * scale**0.5],
+            "D0": [depth * scale, depth * scale, 1.5 * scale],
+        }
+    )  # fmt: skip
+    findings = list(speeds_for_depths(replace(evidence_of(campaign), runs=runs), rules()["units"]))
+    assert {f.file for f in findings} == ({"t.csv", "d.csv"} if named else set())
 
 
 # -- loads in the order of their motion --------------------------------------------------------------

@@ -111,7 +111,9 @@ def speeds_for_depths(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
         rest = [sets for f, sets in numbers.items() if f != file]
         others = [set().union(*(sets[k] for sets in rest)) for k in (0, 1)]
         own = speeds & others[0] or depths & others[1]
-        if rest and not own and speeds <= others[1] and depths <= others[0]:
+        # Round numbers may be both.
+        told = bool(_told(np.array([*speeds, *depths]), rule))
+        if rest and told and not own and speeds <= others[1] and depths <= others[0]:
             what = f"speeds of {min(speeds):g} m/s at depths of {min(depths):g} m (as tested), where the other files "
             what += "have these speeds for depths and these depths for speeds: did two columns change places?"
             yield rule.finding(file, rows_of(tested[tested["file"] == file]), ["U", "D0"], what)
