@@ -293,23 +293,23 @@ def _check_used(header: CampaignFile, runs: pd.DataFrame, where: str) -> None:
             raise InputError(f"{where}, key tare.{k}", "no load", "loads or per_speed_squared: nothing is taken off")
     tables = [("inertia", header.inertia.parts)] if header.inertia.model_inertia_in_loads else []
     tables += [("hydrostatics", header.hydrostatics.parts)] if header.hydrostatics else []
-    with_loads = runs[runs[list(OUTPUTS)].notna().any(axis=1)]
+    loaded = runs[list(OUTPUTS)].notna().any(axis=1)
     for name, parts in tables:
         for part in parts:
-            if not (with_loads["part"] == part).any():
+            if not (loaded & (runs["part"] == part)).any():
                 raise InputError(f"{where}, key {name}.parts", f"{part!r}, and no run of it", "parts of the runs")
-    if header.half_model is not None and with_loads.empty:
+    if header.half_model is not None and not loaded.any():
         raise InputError(f"{where}, key half_model", "declared, and no run has loads", "nothing")
-    _check_axes_used(header, runs, with_loads, where)
+    _check_axes_used(header, runs, bool(loaded.any()), where)
 
 
-def _check_axes_used(header: CampaignFile, runs: pd.DataFrame, with_loads: pd.DataFrame, where: str) -> None:
+def _check_axes_used(header: CampaignFile, runs: pd.DataFrame, loaded: bool, where: str) -> None:
     """Axes of loads and a motion point have runs that they change."""
     for key in ("axes", "moment_axes"):
         stated = getattr(header.frame, key)
-        if stated not in ("", "body") and with_loads.empty:
+        if stated not in ("", "body") and not loaded:
             raise InputError(f"{where}, key frame.{key}", f"{stated!r}, and no run has loads", "nothing")
-    if header.frame.moment_axes and with_loads[[*"KMN"]].isna().all(axis=None):
+    if header.frame.moment_axes and runs[[*"KMN"]].isna().all(axis=None):
         raise InputError(f"{where}, key frame.moment_axes", "declared, and no run has a moment", "nothing")
     if header.motion_point is not None and not turning(runs).any():
         raise InputError(f"{where}, key motion_point", "declared, and no run turns", "nothing")

@@ -273,6 +273,8 @@ def swings_across_its_path(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
     stated = {s.files for s in campaign.header.source if s.reduction is not None and s.reduction.path}
     runs = evidence.runs[~evidence.runs["files"].isin(stated)] if "files" in evidence.runs else evidence.runs
     for rate, (acceleration, angle, sign, force) in _SWINGS.items():
+        if not (runs[acceleration].fillna(0.0) != 0.0).any():
+            continue
         still = evidence.runs[_still(evidence.runs) & kept(evidence.runs, force)]
         slope, _ = _slope(
             _sweep(still, _TEST_OF[angle], angle), angle, force, body, math.radians(rule.limits["widest"])

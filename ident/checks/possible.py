@@ -128,6 +128,8 @@ def motions_of_another_point(evidence: Evidence, rule: Rule) -> Iterator[Finding
         return
     header = campaign.header
     x, y, z = header.frame.frame.vector([getattr(header.moment_point, f"{k}_m") * header.scale.ratio for k in "xyz"])
+    if not any((x, y, z)):
+        return
     runs = evidence.runs[turning(evidence.runs) & (evidence.runs["U"] > 0.0)]
     p, q, r = (runs[k].fillna(0.0) for k in "pqr")
     across = np.hypot(r * x - p * z, p * y - q * x) / runs["U"]
