@@ -93,6 +93,16 @@ def test_per_degree_in_any_spelling(unit):
     assert found[1:] == (0.0, 0.0, 0.0, -1)
 
 
+@pytest.mark.parametrize("header", ["CT*", "C_T", "CQ*", "C_Th", "cq", "thrust loading"])
+def test_thrust_by_the_speed_of_the_flow_is_no_kt(header):
+    """C_T* of four quadrants is over advance and blade speed, C_Th over advance alone."""
+    meant = "KQ" if "q" in header.lower() else "KT"
+    with pytest.raises(InputError, match="by the speed of the flow"):
+        column(header, meant, "f.csv, row 1")
+    assert column(header, meant, "f.csv, row 1", factors=[header]).quantity == meant
+    assert column("Kt", "KT", "f.csv, row 1").quantity == "KT"
+
+
 @pytest.mark.parametrize(
     ("header", "quantity", "expected"),
     [

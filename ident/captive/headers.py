@@ -77,6 +77,8 @@ _MEANT = {
 # A radius that is given as a part of the length, and one that is twice itself.
 _BY_LENGTH = re.compile(r"(?i)R0?\s*/\s*L(?:pp|oa|bp|wl)?")
 _DIAMETER = re.compile(r"(?i)^d\b|\bdia(?:m\w*)?\b")
+# Thrust and torque over the dynamic pressure of advance (C_Th) or of advance and blade (C_T*), not over n^2.
+_BY_FLOW = re.compile(r"(?i)^c[_ ]?(?:t|q|th|tq|s)(?:h|o)?(?:\*|_?\d)?$|thrust[ _-]?load")
 # Sizes of an oscillation that are no amplitude, and phases that are not what they are declared as.
 _NO_AMPLITUDE = re.compile(
     r"(?i)(?<![a-z])(?:p(?:ea)?k?\s?-?\s?(?:to\s?-?\s?)?p(?:ea)?k?|double\s?-?\s?amp\w*|r\.?m\.?s\.?)(?![a-z])"
@@ -212,6 +214,11 @@ def _refuse_other_sizes(header: str, declared: str | None, named: str, place: st
     if named == "R0" and declared is not None and _DIAMETER.search(split(header)[0]):
         text = f'a factor in [source.factor]: "{split(header)[0][:40]}" = 0.5, or 1.0 where it is the radius'
         raise InputError(place, "a header that names a diameter, declared as the radius R0", text)
+    if named in ("KT", "KQ") and declared is not None and _BY_FLOW.search(split(header)[0]):
+        text = f"{named} over rho n^2 D^4 or D^5; a factor of 1.0 in [source.factor] where these are"
+        raise InputError(
+            place, f"a header that names a coefficient by the speed of the flow, declared as {named}", text
+        )
 
 
 def column(header: str, declared: str | None, where: str, factors: Collection[str] = ()) -> Column:
