@@ -120,7 +120,8 @@ def test_a_check_names_every_history_whose_stamps_do_not_rise_and_checks_the_res
     assert (listed[0]["rows"][0], len(listed[0]["rows"])) == (5, REPEATS)
     assert listed[1]["rows"] == [204]
     assert "time steps back 1 times, first from 1099.5 s to 1075 s" in listed[1]["what"]
-    assert all("rate_hz" in f["what"] for f in listed)
+    # Too few digits make stamps that repeat, none that step back.
+    assert ["rate_hz" in f["what"] for f in listed] == [True, False]
 
 
 def test_a_check_of_nothing_but_stamps_that_do_not_rise_names_them_too(tmp_path):
