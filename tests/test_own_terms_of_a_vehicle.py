@@ -13,6 +13,7 @@ import sim
 from ident.captive.campaign import read_campaign
 from ident.database.store import commit, database_rows
 from ident.identification.identify import identify
+from sim.boat import catalogue, own_terms
 from sim.boat.coefficients import Coefficients
 from sim.boat.parts import vehicle_terms
 from sim.boat.vehicle import load_vehicle
@@ -69,6 +70,15 @@ def test_an_own_term_is_identified_and_read_back(tmp_path):
         ("Y_zz,Y,two,u*v,hull,drift_horizontal,x", "power two"),
         ("Y_zz,Y,2,,hull,drift_horizontal,x", "column multiplier"),
         ("Y_zz,Y,2,u*v,fin,drift_horizontal,x", "column part"),
+        ("Y_zz,Y,2,u*v,hull,drift_horizontal,x", "which is Y_v's"),
+        ("Y_zz,Y,2,v*u,hull,drift_horizontal,x", "which is Y_v's"),
+        ("Y_zz,Y,3,ur,hull,rotating_arm,x", "which is Y_ur's"),
+        ("Y_zz,Y,4,r*|r|,hull,turning_arm,x", "column test: 'turning_arm'"),
+        ("Y_zz,Y,3,r*deflection,hull,rotating_arm,x", "column part: 'hull'"),
+        ("Y_zz,Y,4,r*r,hull,rotating_arm,x", "r*|r|"),
+        ("Z_zz,Z,2,v*w,hull,drift_horizontal,x", "an even number"),
+        ("Y_zz,Y,2,r*|r|,hull,rotating_arm,x", "column power: 2 (allowed: 4"),
+        ("Y_zz,Y,2,v*v*v,hull,drift_horizontal,x", "v*v*v/U"),
     ],
 )
 def test_a_row_that_cannot_be_one_is_refused_with_its_place(tmp_path, row, words):
@@ -77,6 +87,32 @@ def test_a_row_that_cannot_be_one_is_refused_with_its_place(tmp_path, row, words
         vehicle_terms(vehicle)
     assert words in str(caught.value)
     assert "own.csv" in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "row",
+    [
+        "Y_zz,Y,2,v*v*v/U,hull,drift_horizontal,x",
+        "Y_zz,Y,4,r*|r|,hull,rotating_arm acceleration,x",
+        "X_zz,X,4,u*u*r/U*r/U,hull,rotating_arm,x",
+        "N_zz,N,4,U*r*deflection,rudders,rotating_arm,x",
+    ],
+)
+def test_products_that_the_set_does_not_have_are_taken(tmp_path, row):
+    """The dimensions of every row are those of the table: power 4 - lengths of a force, 5 - lengths of a moment."""
+    assert vehicle_terms(load_vehicle(boat(tmp_path, TERMS.splitlines()[0] + "\n" + row + "\n")))
+
+
+def test_every_row_of_the_table_has_the_dimensions_that_own_rows_need():
+    """The rule of the module holds for the table that it is taken from."""
+    for term in (t for name in catalogue.SETS for t in catalogue.terms(name) if t.output):
+        own_terms._dimensions(term, term.name)
+
+
+def test_a_file_with_semicolons_is_told_its_columns(tmp_path):
+    vehicle = load_vehicle(boat(tmp_path, OWN.replace(",", ";")))
+    with pytest.raises(InputError, match="with commas between"):
+        vehicle_terms(vehicle)
 
 
 def test_a_file_that_is_not_there_is_refused(tmp_path):

@@ -33,7 +33,8 @@ RULES = {
 
 # Sign of each output and state factor under the port/starboard mirror.
 MIRROR_OUTPUT = {"X": 1, "Y": -1, "Z": 1, "K": -1, "M": 1, "N": -1}
-MIRRORED_FACTORS = {"v", "p", "r", "sgn(v)", "v/U", "r/U", "deflection", "vdot", "pdot", "rdot"}
+MIRRORED_FACTORS = {"v", "p", "r", "sgn(v)", "v/U", "r/U", "deflection", "vdot", "pdot", "rdot", "beta"}
+MIRRORED_FACTORS |= {"up", "ur", "vq", "wp", "wr", "pq", "qr"}
 
 # Everything a multiplier or an axis may name, in the order of the state-feature vector
 # that the forward model fills. ``S`` is sqrt(v^2 + w^2); ``V``, ``delta_c`` and ``delta``
@@ -203,7 +204,8 @@ def axes() -> dict[str, Axis]:
     }
 
 
-def _term(row: dict[str, str]) -> Term:
+def read_term(row: dict[str, str]) -> Term:
+    """A row of the term table, or of a vehicle's own term file, not yet checked."""
     text = row["multiplier"]
     parity = {a: 1 if v == "even" else -1 for a, v in _pairs(row["parity"]).items()}
     return Term(
@@ -273,7 +275,7 @@ def terms(term_set: str) -> tuple[Term, ...]:
     if term_set not in SETS:
         raise CatalogueError(f"unknown term set {term_set!r}; known: {', '.join(SETS)}")
     with (files("sim") / "data" / "terms.csv").open(encoding="utf-8") as stream:
-        rows = [_term(r) for r in csv.DictReader(stream)]
+        rows = [read_term(r) for r in csv.DictReader(stream)]
     chosen = [t for t in rows if term_set in t.sets]
     names = [t.name for t in chosen]
     if len(names) != len(set(names)):
@@ -283,69 +285,6 @@ def terms(term_set: str) -> tuple[Term, ...]:
     if term_sets()[term_set].constant:
         chosen = [t if t.group == "propulsion" else replace(t, axes=(), parity={}, extrapolation={}) for t in chosen]
     return tuple(chosen)
-
-
-# Columns of a vehicle's own term file; the others of the table are the defaults below.
-OWN_COLUMNS = ("name", "output", "power", "multiplier", "part", "test")
-_OWN_DEFAULTS = {
-    "group": "own",
-    "norm": "rho/2 L",
-    "axes": "",
-    "parity": "",
-    "extrapolation": "",
-    "equation": "",
-    "share_of": "",
-    "note": "",
-}
-
-
-@cache
-def own_terms(path: str, term_set: str, changed: int = 0) -> tuple[Term, ...]:
-    """Rows that a vehicle adds to its term set, from a CSV file beside its own.
-
-    Parameters
-    ----------
-    path : Of the file: columns ``name output power multiplier part test``, perhaps others of ``data/terms.csv``.
-    term_set : The set they are added to.
-    changed : Time of its last change, so that a file is read again after one.
-
-    Raises
-    ------
-    InputError
-        For a file that cannot be read, a column that is missing or unknown, a name of the set, or a
-        row that contradicts itself.
-    """
-    try:
-        with open(path, encoding="utf-8-sig", newline="") as stream:
-            rows = list(csv.DictReader(stream))
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise InputError(path, f"cannot be read: {error}", "a CSV file of terms in UTF-8") from error
-    known = (*OWN_COLUMNS, *_OWN_DEFAULTS)
-    terms_of_file: list[Term] = []
-    taken = {t.name for t in terms(term_set)}
-    for number, row in enumerate(rows, start=2):
-        place = f"{path}, row {number}"
-        given = {k: (v or "").strip() for k, v in row.items() if isinstance(k, str)}
-        wrong = [c for c in OWN_COLUMNS if not given.get(c)] + [k for k in row if k not in known]
-        if wrong:
-            raise InputError(f"{place}, column {wrong[0]}", "nothing or unknown", ", ".join(known))
-        if given["name"] in taken:
-            raise InputError(f"{place}, column name", repr(given["name"]), f"a name the set {term_set} does not have")
-        if given["output"] not in OUTPUTS or not given["power"].isdigit() or not 0 < int(given["power"]) < 10:
-            raise InputError(
-                place, f"output {given['output']}, power {given['power']}", "X Y Z K M N and a whole number"
-            )
-        made = _term({**_OWN_DEFAULTS, "sets": term_set, **given})
-        try:
-            check(made)
-        except CatalogueError as error:
-            text = "factors, axes and parities as in data/terms.csv, joined by *"
-            raise InputError(place, str(error), text) from error
-        taken.add(made.name)
-        terms_of_file.append(made)
-    if not terms_of_file:
-        raise InputError(path, "no row", "at least one term")
-    return tuple(terms_of_file)
 
 
 @cache

@@ -9,6 +9,7 @@ import numpy as np
 
 from sim.boat import catalogue
 from sim.boat.catalogue import MIRROR_OUTPUT, Term
+from sim.boat.own_terms import own_terms
 from sim.boat.vehicle import Plane, Vehicle
 from sim.files.errors import InputError
 
@@ -44,7 +45,7 @@ def all_terms(vehicle: Vehicle) -> tuple[Term, ...]:
         return catalogue.terms(vehicle.term_set)
     path = Path(vehicle.terms)
     changed = path.stat().st_mtime_ns if path.is_file() else 0
-    added = catalogue.own_terms(vehicle.terms, vehicle.term_set, changed)
+    added = own_terms(vehicle.terms, vehicle.term_set, changed)
     for term in added:
         if term.part not in (*vehicle.part_names(), "section"):
             raise InputError(f"{path}, term {term.name}, column part", repr(term.part), ", ".join(vehicle.part_names()))
