@@ -16,8 +16,6 @@ from dataclasses import dataclass, replace
 from functools import cache
 from importlib.resources import files
 
-from sim.files.errors import InputError
-
 OUTPUTS = ("X", "Y", "Z", "K", "M", "N")
 # The state in its order: velocities in the body frame, position and angles in the earth frame.
 STATES = ("u", "v", "w", "p", "q", "r", "x", "y", "z", "phi", "theta", "psi")
