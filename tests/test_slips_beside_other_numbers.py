@@ -139,6 +139,8 @@ SLIPS = {
     "an acceleration of twice": (
         "starter", "acceleration_rdot.csv", times("rdot_radps2", 1.0 / KNOT), "proportion", "warning", "N_rdot"),
     "a zero in X": ("starter", DRIFT, plus("X_N", 9.0), "between_tests", "warning", "straight ahead is off"),
+    "a zero in X of towing": (
+        "bb2", "towing.csv", plus("X_N", 20000.0), "between_tests", "warning", "straight ahead is off"),
     "the end of a curve": (
         "starter", "open_water.csv", without("OW-0.8", "OW-1.0"), "open_water", "warning", "beyond the open-water"),
     "thrust of half at rest": (

@@ -107,13 +107,16 @@ def speeds_for_depths(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
         str(file): tuple({_short(x) for x in group[c]} for c in ("speed", "depth"))
         for file, group in tested.groupby("file", sort=False)
     }
+    # In how many files a number is a speed, and a depth.
+    counts = [Counter(x for sets in numbers.values() for x in sets[k]) for k in (0, 1)]
     for file, (speeds, depths) in numbers.items():
-        rest = [sets for f, sets in numbers.items() if f != file]
-        others = [set().union(*(sets[k] for sets in rest)) for k in (0, 1)]
-        own = speeds & others[0] or depths & others[1]
+        # A file's own numbers count once.
+        own = any(counts[0][x] > 1 for x in speeds) or any(counts[1][x] > 1 for x in depths)
+        crossed = all(counts[1][x] > (x in depths) for x in speeds) and all(
+            counts[0][x] > (x in speeds) for x in depths
+        )
         # Round numbers may be both.
-        told = bool(_told(np.array([*speeds, *depths]), rule))
-        if rest and told and not own and speeds <= others[1] and depths <= others[0]:
+        if crossed and not own and _told(np.array([*speeds, *depths]), rule):
             what = f"speeds of {min(speeds):g} m/s at depths of {min(depths):g} m (as tested), where the other files "
             what += "have these speeds for depths and these depths for speeds: did two columns change places?"
             yield rule.finding(file, rows_of(tested[tested["file"] == file]), ["U", "D0"], what)

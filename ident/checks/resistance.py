@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -115,22 +116,23 @@ def same_resistance_at_one_speed(evidence: Evidence, rule: Rule) -> Iterator[Fin
     if body is None:
         return
     runs = straight_ahead(evidence.runs)
-    runs = runs.assign(place=runs["U"].round(6).astype(str) + "/" + runs["D0"].round(6).astype(str))
     size = prime(runs, "X", body)
     error = prime(runs.assign(X=runs["s_X"].fillna(0.0)), "X", body)
     towed = runs["test"] == "towing"
-    at = size[towed].groupby(runs["place"][towed]).median()
-    known = error[towed].groupby(runs["place"][towed]).median()
-    for (file, test), group in runs[~towed & runs["place"].isin(at.index)].groupby(
-        [together(runs), runs["test"]], sort=False
-    ):
-        base = group["place"].map(at)
-        off = float((size[group.index] - base).median())
-        usual = float(base.abs().median())
-        spread = math.hypot(float(error[group.index].median()), float(group["place"].map(known).median()))
-        share = abs(off) / usual if usual > 0.0 else 0.0
-        # By more than half it is a finding already.
-        if share <= rule.limits["ahead"] or abs(off) <= rule.limits["errors"] * spread or share > rule.limits["share"]:
+    beside: dict[Any, tuple[float, float]] = {}
+    for _, drifting in runs[~towed].groupby(["U", "D0"], sort=False):
+        speed, depth = float(drifting["U"].iloc[0]), float(drifting["D0"].iloc[0])
+        deep = (runs["D0"] - depth).abs() <= rule.limits["depth"] * abs(depth)
+        same = runs.index[towed & deep & np.isclose(runs["U"], speed, rtol=1e-6)]
+        if len(same):
+            known = float(size[same].median()), float(error[same].median())
+            beside |= dict.fromkeys(drifting.index, known)
+    tested = runs.loc[list(beside)]
+    for (file, test), group in tested.groupby([together(tested), "test"], sort=False):
+        base, sigma = (pd.Series([beside[k][i] for k in group.index], group.index) for i in (0, 1))
+        off, usual = float((size[group.index] - base).median()), float(base.abs().median())
+        spread = math.hypot(float(error[group.index].median()), float(sigma.median()))
+        if usual <= 0.0 or abs(off) <= max(rule.limits["ahead"] * usual, rule.limits["errors"] * spread):
             continue
         what = f"X of {test} straight ahead is off that of towing at the same speed by {100.0 * off / usual:+.3g} % of "
         what += "the resistance: a zero that was not taken off, or a thrust?"

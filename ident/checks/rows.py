@@ -59,9 +59,10 @@ def a_run_of_another_test(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
     """One run of a test among many of one other test of its file, without the motion that its own test is made of."""
     runs = evidence.runs
     tested = runs[runs["test"] != PUBLISHED]
+    tested = tested[tested.groupby("file")["test"].transform("nunique") == 2]
     for file, group in tested.groupby("file", sort=False):
         counts = group["test"].value_counts()
-        if len(counts) != 2 or counts.iloc[1] != 1 or counts.iloc[0] < rule.limits["others"]:
+        if counts.iloc[1] != 1 or counts.iloc[0] < rule.limits["others"]:
             continue
         odd = group[group["test"] == counts.index[1]]
         motions = list(_OF_TEST.get(str(counts.index[1]), ()))
@@ -95,10 +96,9 @@ def a_run_that_keeps_what_the_others_exclude(evidence: Evidence, rule: Rule) -> 
     if "exclude" not in runs:
         return
     tested = runs[runs["test"] != PUBLISHED]
+    tested = tested[tested.groupby(["file", "test"])["test"].transform("size") > rule.limits["others"]]
     tested = tested.assign(out=tested["exclude"].fillna("").str.split())
     for (file, test), group in tested.groupby(["file", "test"], sort=False):
-        if len(group) <= rule.limits["others"]:
-            continue
         for load in sorted({name for names in group["out"] for name in names if name in group}):
             without = np.array([load in names for names in group["out"]])
             odd = group[~without & group[load].notna().to_numpy()]
