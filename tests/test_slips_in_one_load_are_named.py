@@ -123,6 +123,13 @@ SLIPS = {
     "roll damping in N mm": ("starter", "arm_p.csv", times("K_Nm", 1e3), "proportion", "error", "K_up"),
     "ten times the force by pitch": ("starter", "arm_q.csv", times("Z_N", 10.0), "proportion", "warning", "Z_uq"),
     "pounds in one load of a turn": ("starter", "arm_r.csv", times("N_Nm", 1 / 14.5), "proportion", "warning", "N_ur"),
+    "kilograms in the moment of a table": (
+        "bb2", "rotating_arm.csv", times("N_Nm", 1 / 9.80665), "proportion", "warning", "N_ur"),
+    "foot-pounds in one load of a turn": (
+        "starter", "arm_r.csv", times("N_Nm", 1 / 4.448), "proportion", "warning", "Y_ur"),
+    "pounds in the moment by pitch": (
+        "starter", "arm_q.csv", times("M_Nm", 1 / 4.448), "proportion", "error", "Z_uq"),
+    "a torque rounded to nothing": ("starter", "open_water.csv", times("KQ", 0.0), "open_water", "error", "KQ = 0"),
     "roll inertia": ("starter", "acceleration_pdot.csv", times("K_Nm", 0.01), "proportion", "error", "K_pdot"),
     "a cross term turned": ("remus100", "published.csv", value("M_uwa", -1.0), "proportion", "error", "M_uwa"),
     "one of a table's sign": ("nps-auv2", "published.csv", value("X_vr", -1.0), "proportion", "error", "X_vr"),
@@ -175,7 +182,7 @@ def test_a_row_cut_short_with_the_file_is_refused(place):
 
 
 def test_the_rows_name_coefficients_that_are_there():
-    known, own = {t.name for s in SETS for t in terms(s)}, {"mass", "diameter", "propeller", "rudder_aspect"}
+    known, own = {t.name for s in SETS for t in terms(s)}, {"mass", "diameter", "draught", "propeller", "rudder_aspect"}
     for row in proportions():
         assert set(row.names) <= known | own
         parts = {p for over in row.over for p in re.split(r"[+\-*]", over) if p}

@@ -60,6 +60,7 @@ def test_every_bundled_vehicle_can_be(name):
         ("[3.433, 17.6, 17.522]", "[3.433, 1760.0, 1752.2]", "radius_of_gyration"),
         ("mass = { value = 4.440e6", "mass = { value = 4.440e5", "displaced_mass"),
         ("diameter = { value = 5.0", "diameter = { value = 500.0", "propeller.diameter"),
+        ("value = [0.01, 10.0]", "value = [0.6, 600.0]", "propeller.limits"),
         ("diameter = { value = 5.0", "diameter = { value = 0.5", "propeller.diameter"),
         ("centre_of_gravity = { value = [0.0", "centre_of_gravity = { value = [100.0", "centre_of_gravity"),
         ("position = [31.1794, 3.9057, -3.9057]", "position = [62.3588, 3.9057, -3.9057]", "stern_plane_1, position"),
@@ -97,6 +98,29 @@ def test_every_bundled_vehicle_can_be(name):
 def test_a_vehicle_that_no_body_is_like_is_refused(tmp_path, old, new, key):
     with pytest.raises(InputError) as caught:
         load_vehicle(written(tmp_path, "vehicles", "bb2", (old, new)))
+    assert key in caught.value.where, caught.value
+
+
+@pytest.mark.parametrize(
+    ("name", "share", "key"),
+    [
+        ("centre_of_gravity", 1.0, ""),
+        ("centre_of_gravity", -1.0, "centre_of_gravity"),
+        ("displaced_mass", 1.025, "mass"),
+    ],
+)
+def test_a_ship_floats_on_an_even_keel(tmp_path, name, share, key):
+    """Archimedes: its weight is that of the displaced water, and stands over it."""
+    text = (files("sim") / "vehicles" / "kvlcc2.toml").read_text("utf-8")
+    found = re.search(rf"^{name} = {{ value = \[?(-?[0-9.]+)", text, re.M)
+    assert found
+    path = tmp_path / "kvlcc2.toml"
+    path.write_text(f"{text[: found.start(1)]}{share * float(found[1])!r}{text[found.end(1) :]}", "utf-8")
+    if not key:
+        assert load_vehicle(path).name == "kvlcc2"
+        return
+    with pytest.raises(InputError) as caught:
+        load_vehicle(path)
     assert key in caught.value.where, caught.value
 
 

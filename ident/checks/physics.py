@@ -310,7 +310,7 @@ def thrust_that_rises(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
                 continue
             slack = rule.limits["rises"] * float(np.abs(value).max()) + 3.0 * error[1:]
             rises = np.flatnonzero(value[1:] > np.minimum.accumulate(value)[:-1] + slack)
-            turns = (given["KT"] > 0.0) & (given["KQ"] < 0.0) & (name == "KQ")
+            turns = (given["KT"] > 0.0) & (given["KQ"] <= 0.0) & (name == "KQ")
             against = np.flatnonzero(turns)
             if not len(rises) and not len(against):
                 continue

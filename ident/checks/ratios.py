@@ -21,7 +21,7 @@ from sim.boat.parts import vehicle_terms
 # Value and standard error.
 Known = Mapping[str, tuple[float, float]]
 # Sizes of the boat among what is known, as parts of its length.
-_SIZES = ("mass", "diameter", "propeller", "rudder_aspect")
+_SIZES = ("mass", "diameter", "draught", "propeller", "rudder_aspect")
 # Norms of what is without a dimension.
 _PRIME = ("rho/2 L", "")
 
@@ -34,8 +34,8 @@ class Proportion:
     ----------
     names : Coefficients of which the first known is judged.
     over : What it is divided by: sums and products of coefficients and of the boat's ``mass``, ``diameter``,
-        ``propeller`` (its diameter) and ``rudder_aspect``, of which the first known is taken; nothing where the
-        value itself is judged.
+        ``draught``, ``propeller`` (its diameter) and ``rudder_aspect``, of which the first known is taken; nothing
+        where the value itself is judged.
     low, high : Between which the quotient is.
     severity : Of a finding.
     sets : Term sets whose terms of that name are meant; all where there is none.
@@ -114,6 +114,8 @@ def _known(evidence: Evidence) -> dict[str, tuple[float, float]]:
     if body.mass is not None:
         known["mass"] = body.mass / (0.5 * body.density * body.length**3), 0.0
         known["diameter"] = spheroid_diameter(body) / body.length, 0.0
+    if body.draught is not None:
+        known["draught"] = body.draught / body.length, 0.0
     if vehicle.propeller is not None:
         known["propeller"] = vehicle.diameter / body.length, 0.0
     if vehicle.rudder is not None:
@@ -175,7 +177,7 @@ def beyond(row: Proportion, value: tuple[float, float], base: tuple[float, float
     stretch = 1.0 + limits["errors"] * math.hypot(of_value, relative)
     low = row.low * stretch if row.low < 0.0 else row.low - slack
     high = row.high * stretch if row.high > 0.0 else row.high + slack
-    if low <= quotient <= high or (quotient * (row.low + row.high) < 0.0 and abs(quotient) < slack):
+    if low <= quotient <= high:
         return ""
     edge = row.low if quotient < row.low else row.high
     away = quotient / edge if edge else math.inf

@@ -42,6 +42,12 @@ _ABOVE = 0.05
 _FARTHEST = 0.75
 # Diameter of a propeller over the length: a large tanker has 0.03, a torpedo 0.1.
 _PROPELLER = (0.01, 0.5)
+# Faster than sound in air [m/s]: no blade tip, and revolutions per minute taken for those per second.
+_FASTEST_TIP = 300.0
+# Of what floats: displacement over weight, and how far their centres are apart along, over the length: a hundredth of
+# the length is about half a degree of trim, since the longitudinal metacentre is a length above.
+_AFLOAT = 0.01
+_ONE_STATION = 0.02
 _MOTIONS = ("surge", "sway", "heave", "roll", "pitch", "yaw")
 # Floating boats displace what they weigh; a submerged one differs by what its planes can carry.
 _OUT_OF_TRIM = 0.5
@@ -64,7 +70,8 @@ def check_vehicle(vehicle: Any, where: str) -> None:
     zero, below its length, and the square of none exceeds the sum of the others' (the principal moments
     of inertia of any body: Goldstein, *Classical mechanics*, section 5.3). Whatever is on the boat is no
     farther from its centre of buoyancy than a cone's tip from its centroid, and the boat is as full as a sphere
-    at most; its propeller has a hundredth to half of the length. A boat that
+    at most; its propeller has a hundredth to half of the length, and its tips are slower than sound in air. A ship
+    displaces what it weighs, with its centre of gravity above that of buoyancy, not along from it. A boat that
     may heel or trim has its centre of gravity below that of buoyancy, or it lies on its side. A plane has a
     span across its chord, and is the mirror image of the plane that it mirrors, whose share of each command
     is its own seen in the mirror; all planes together lift the bow for dV > 0 and turn to starboard for dH > 0.
@@ -142,6 +149,7 @@ def _faults(vehicle: Any) -> Iterator[tuple[str, str, str]]:
     yield from _amidships(vehicle)
     yield from _places(vehicle)
     yield from _at_rest(vehicle)
+    yield from _afloat(vehicle)
     for plane in vehicle.planes:
         yield from _plane(plane, vehicle.frame.frame.sign("x"))
         yield from _image(plane, vehicle)
@@ -184,6 +192,11 @@ def _mass(vehicle: Any) -> Iterator[tuple[str, str, str]]:
     if vehicle.propeller and not least <= vehicle.diameter <= most:
         text = f"{least:.3g} to {most:.3g} m: a hundredth to half of the length of {length:g} m"
         yield "propeller.diameter", f"{vehicle.diameter:g} m", text
+    if vehicle.propeller:
+        tip = math.pi * vehicle.diameter * max(abs(float(n)) for n in vehicle.propeller.limits.value)
+        if tip > _FASTEST_TIP:
+            allowed = f"{_FASTEST_TIP:g} m/s at most: revolutions per second"
+            yield "propeller.limits", f"blade tips at {tip:.4g} m/s", allowed
 
 
 def _amidships(vehicle: Any) -> Iterator[tuple[str, str, str]]:
@@ -226,6 +239,20 @@ def _at_rest(vehicle: Any) -> Iterator[tuple[str, str, str]]:
         if angle > _AT_REST:
             text = f"{abs(arm):.4g} m off the centre of buoyancy and {z:.4g} m below it: a {motion} of {angle:.3g} deg"
             yield key, f"{text} at rest", f"{_AT_REST:g} deg at most"
+
+
+def _afloat(vehicle: Any) -> Iterator[tuple[str, str, str]]:
+    """A ship, whose heave and pitch are held, displaces what it weighs and lies on an even keel (Archimedes)."""
+    if not {"Z", "M"} <= set(held(vehicle.term_set)):
+        return
+    given = vehicle.particulars
+    share = given.displaced_mass.value / given.mass.value
+    if abs(share - 1.0) > _AFLOAT:
+        yield "particulars.displaced_mass", f"{share:.4g} times the mass", "the mass: what floats displaces its weight"
+    apart = abs(given.centre_of_gravity.value[0] - given.centre_of_buoyancy.value[0])
+    if apart > _ONE_STATION * given.length.value:
+        allowed = f"{_ONE_STATION * given.length.value:.3g} m at most: above one another, or the ship trims"
+        yield "particulars.centre_of_gravity", f"{apart:.4g} m along from the centre of buoyancy", allowed
 
 
 def _places(vehicle: Any) -> Iterator[tuple[str, str, str]]:
