@@ -8,7 +8,8 @@ of its channels, and counted by channel and kind; nothing is put in its place.
   an integer's range far outside of all others, or one value that stands often and far from all others: what
   loggers write where they have nothing.
 * **spike**: at most three samples far outside of 98 % of the record (or of 90 %), with neighbours inside on both
-  sides. What stands at the start of a record is the start-up transient's, and not looked at.
+  sides, or inside of it and far from all that stand around them (``ident.timeseries.spikes``). What stands at the
+  start of a record is the start-up transient's, and not looked at.
 * **stuck**: one value for longer than chance repeats it, while the steps around it are larger than
   the last digit: a frozen channel, an amplifier at its limit, a dropout to zero. A computed load
   that has settled moves by its last digit before it rests, and is none.
@@ -26,6 +27,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
+
+from ident.timeseries.spikes import Surroundings, beside_the_way
 
 Array = NDArray[np.float64]
 
@@ -100,6 +103,7 @@ class _Channel:
     high: float = math.inf
     digit: float = 0.0
     longest: int = 1 << 60
+    beside: float = math.inf
     sentinels: tuple[float, ...] = ()
     often: tuple[float, ...] = ()
     clipped: str = ""
@@ -183,8 +187,11 @@ class Usual:
             )
             known = marks.get("sentinel", np.zeros(len(column), dtype=bool))
             outside = ((column < channel.low) | (column > channel.high)) & ~known
-            if outside.any():
-                marks["spike"] = _short(outside, len(before) == 0)
+            # A value that stands often is another kind, and no neighbour of a spike.
+            beside = beside_the_way(np.where(known, np.nan, column), channel.beside)
+            if outside.any() or beside.any():
+                first = len(before) == 0
+                marks["spike"] = _short(outside, first) | _short(beside, first)
                 known = known | marks["spike"]
             if len(column) > channel.longest:
                 marks["stuck"] = _stuck(column, channel) & ~known
@@ -238,12 +245,14 @@ class _Learning:
         self.digit = math.inf
         self.last: float | None = None
         self.nines: Counter[float] = Counter()
+        self.around = Surroundings()
         self.ends = (_Extreme(1.0), _Extreme(-1.0))
 
     def feed(self, values: Array) -> None:
         values = values[~np.isnan(values)]
         if not values.size:
             return
+        self.around.feed(values)
         start = -self.count % self.stride
         self.kept = np.concatenate([self.kept, values[start :: self.stride]])
         while self.kept.size > _KEPT:
@@ -292,6 +301,7 @@ class _Learning:
             # A channel of few digits has its usual values further apart than its quantiles.
             if closer > max(_DIGITS * channel.digit, 0.01 * max(abs(lower), abs(upper))):
                 channel.low, channel.high = max(channel.low, lower - closer), min(channel.high, upper + closer)
+        channel.beside = max(self.around.limit(high - low), _DIGITS * channel.digit)
         repeats = min(max(self.equal / max(self.equal + self.steps, 1), 1e-12), 1.0 - 1e-12)
         channel.longest = max(_RUN, math.ceil(math.log(_CHANCE / max(self.count, 1)) / math.log(repeats)))
         for end, word in zip(self.ends, ("largest", "smallest"), strict=True):
