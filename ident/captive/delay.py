@@ -41,6 +41,8 @@ _SLOW = 1.0 / 16.0
 _SHARE = 0.3
 # Steps that differ by more than this factor are no clock that a spline is laid through.
 _UNEVEN = 5.0
+# Steps that differ by more than this part are made even before they are filtered.
+_UNEVENNESS = 0.1
 # A lag is seen when its standard error is below this share of a period, and no other lag fits as well by so
 # many standard errors.
 _SEEN = 0.005
@@ -84,20 +86,24 @@ def of_loads(
     if "displacement" not in names or not loads or n < 4 * _PER_PERIOD:
         return None
     t, w = _means(time, step, n), _means(weight, step, n)
+    columns = {o: _means(values[:, names.index(o)], step, n) for o in (*loads, "displacement")}
+    if not _even(np.diff(t), period / _PER_PERIOD):
+        return None
+    t, w, columns = _filled(t, w, columns)
     inside = (t > t[0] + 0.5 * period) & (t < t[-1] - 0.5 * period)
-    if not _even(np.diff(t), period / _PER_PERIOD) or inside.sum() < 4 * _PER_PERIOD:
+    if inside.sum() < 4 * _PER_PERIOD:
         return None
     # Few records need them, and they are slow to load.
     from scipy.interpolate import CubicSpline
     from scipy.optimize import minimize_scalar
 
-    displacement = _means(values[:, names.index("displacement")], step, n)
+    displacement = columns["displacement"]
     if not _more_than_a_line(t, displacement, frequency):
         return None
     smooth = _smoothing(t, _SMOOTH * period)
     moved = CubicSpline(t, smooth(displacement))
     root = np.sqrt(w[inside] / w[inside].mean())
-    y = np.stack([smooth(_means(values[:, names.index(o)], step, n))[inside] * root for o in loads], axis=1)
+    y = np.stack([smooth(columns[o])[inside] * root for o in loads], axis=1)
     early = [t[inside] - stated.get(o, 0.0) + stated.get("displacement", 0.0) for o in loads]
 
     def residuals(tau: float) -> Array:
@@ -125,6 +131,16 @@ def of_loads(
     others = (rests / noise).sum(axis=1)[np.abs(grid - tau) > 2.0 * _STEP * period] - left(tau)
     alone = bool((others > _SURE**2 * correlated).all())
     return Delay(f"the loads {' '.join(loads)}", tau, error) if alone and error < _SEEN * period else None
+
+
+def _filled(t: Array, w: Array, columns: dict[str, Array]) -> tuple[Array, Array, dict[str, Array]]:
+    """Even steps: a filter over samples with some left out shifts what is behind them."""
+    apart = np.diff(t)
+    usual = float(np.median(apart))
+    if float(np.abs(apart - usual).max()) <= _UNEVENNESS * usual:
+        return t, w, columns
+    even = np.arange(t[0], t[-1], usual)
+    return even, np.interp(even, t, w), {name: np.interp(even, t, column) for name, column in columns.items()}
 
 
 def _smoothing(t: Array, width: float) -> Callable[[Array], Array]:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ident.captive import delay
 from ident.captive.channels import Channels, Timed, timed
 from ident.captive.left_behind import LeftBehind
-from ident.captive.motion import frequency_of, line_of, phase_is_known, phase_is_taken, stated_frequency
+from ident.captive.motion import frequency_of, leap_of, line_of, phase_is_known, phase_is_taken, stated_frequency
 from ident.captive.oscillation import PHASES, Oscillation
 from ident.captive.quantities import HARMONICS, TAKEN
 from ident.captive.source import MOTIONS, Reduction
@@ -22,6 +22,7 @@ from ident.timeseries import reduction
 from ident.timeseries.clock import Clock
 from ident.timeseries.faults import Usual, usual
 from ident.timeseries.frequency import Line
+from ident.timeseries.phase import Leap
 from sim.boat.catalogue import OUTPUTS
 from sim.files.errors import InputError
 
@@ -48,6 +49,7 @@ class Reduced:
     stated_hz : Frequency of an oscillation as stated, where the record's own was used instead.
     line : Frequency found in the record.
     delays : By how much channels come behind the motion, beyond what is stated.
+    leap : A step in the phase of the oscillation.
     left_behind : What a moment point that stays while the body moves would do, where nothing says that it goes along.
     """
 
@@ -67,6 +69,7 @@ class Reduced:
     line: Line | None = None
     delays: tuple[delay.Delay, ...] = ()
     left_behind: tuple[LeftBehind, ...] = ()
+    leap: Leap | None = None
 
     @property
     def runs(self) -> list[str]:
@@ -155,12 +158,13 @@ def reduce(channels: Channels, rule: Reduction, run_id: str, frequency: float | 
     names = [q for q in channels.quantities if q != "time"]
     _check_channels(channels, rule)
     sound, faults = _sound(channels, rule, names)
-    line, stated = None, None
+    line, stated, leapt = None, None, None
     if rule.kind == "oscillatory":
         frequency = stated_frequency(channels, frequency)
         line = line_of(sound(None), names, frequency, channels)
         frequency, stated = frequency_of(line, frequency, names, rule, channels)
         phase_is_known(channels, rule, names)
+        leapt = leap_of(sound(None), names, line)
     regressors, span = _regressors(channels, rule, frequency, sound)
     clock = Clock() if "time" in channels.quantities else None
     faults.counts.clear()
@@ -180,6 +184,7 @@ def reduce(channels: Channels, rule: Reduction, run_id: str, frequency: float | 
         phase_taken=rule.kind == "oscillatory" and phase_is_taken(names, rule),
         stated_hz=stated,
         line=line,
+        leap=leapt,
     )
     if rule.kind == "oscillatory":
         values, delays = _harmonic_values(names, fit, frequency or 0.0, rule)

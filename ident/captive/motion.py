@@ -10,7 +10,8 @@ import numpy as np
 from ident.captive.channels import Channels, Timed, timed
 from ident.captive.source import Reduction
 from ident.timeseries import blocks as condense
-from ident.timeseries.frequency import Line, estimate
+from ident.timeseries.frequency import START, Line, estimate
+from ident.timeseries.phase import Leap, leap
 from sim.boat.catalogue import OUTPUTS
 from sim.files.errors import InputError
 
@@ -43,6 +44,19 @@ def line_of(pieces: Timed, names: list[str], frequency: float | None, channels: 
         clear = line is not None and line.share > _CLEAR and line.frequency * (time[-1] - time[0]) > _CYCLES
         line = line if clear else None
     return None if line is None else replace(line, channel=chosen[line.channel])
+
+
+def leap_of(pieces: Timed, names: list[str], line: Line | None) -> Leap | None:
+    """A step in the phase of the oscillation, of the channel that its frequency was found in."""
+    if line is None:
+        return None
+    condensed = condense.condense(pieces, condense.constant, len(names))
+    weight, time, _, values = condensed.blocks()
+    late = np.ones(time.size, dtype=bool)
+    if names[line.channel] != "displacement":
+        # A load may have its start-up transient there.
+        late = time >= time[0] + START * (time[-1] - time[0])
+    return leap(time[late], values[late, line.channel], weight[late], line.frequency)
 
 
 def frequency_of(

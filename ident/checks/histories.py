@@ -156,6 +156,21 @@ def a_phase_that_nothing_says(evidence: Evidence, rule: Rule) -> Iterator[Findin
             yield rule.finding(one.file, [], ["time"], what)
 
 
+@check("motion")
+def a_phase_that_leaps(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
+    """Oscillations that do not go on in the phase in which they began: no one frequency and phase fits them."""
+    for one in evidence.histories:
+        if one.leap is None or one.line is None or one.leap.degrees < rule.limits["leap"]:
+            continue
+        name = one.loads[one.line.channel]
+        what = (
+            f"run {one.run_id}: the phase of {name} leaps by {one.leap.degrees:.0f} deg about {one.leap.time:.4g} s: "
+        )
+        what += "a clock that jumped, samples that are lost, or runs behind each other in one file"
+        severe = "error" if one.leap.degrees > rule.limits["torn"] else rule.severity
+        yield rule.finding(one.file, [], ["time", name], what, severe)
+
+
 @check("delay")
 def behind_the_motion(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
     """Loads and measured rates that come behind the displacement by more than is stated."""

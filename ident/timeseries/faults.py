@@ -187,17 +187,19 @@ class Usual:
             )
             known = marks.get("sentinel", np.zeros(len(column), dtype=bool))
             outside = ((column < channel.low) | (column > channel.high)) & ~known
-            # A value that stands often is another kind, and no neighbour of a spike.
-            beside = beside_the_way(np.where(known, np.nan, column), channel.beside)
-            if outside.any() or beside.any():
-                first = len(before) == 0
-                marks["spike"] = _short(outside, first) | _short(beside, first)
+            if outside.any():
+                marks["spike"] = _short(outside, len(before) == 0)
                 known = known | marks["spike"]
             if len(column) > channel.longest:
                 marks["stuck"] = _stuck(column, channel) & ~known
                 if c == rest.column:
                     marks["stuck"][inside][: rest.samples(values[:, c])] = False
                 known = known | marks["stuck"]
+            # What is out already is no neighbour that a spike could be told by.
+            beside = beside_the_way(np.where(known, np.nan, column), channel.beside)
+            if beside.any():
+                marks["spike"] = marks.get("spike", False) | _short(beside, len(before) == 0)
+                known = known | marks["spike"]
             if channel.often:
                 marks["sentinel"] = marks.get("sentinel", False) | (np.isin(column, channel.often) & ~known)
             for kind, mark in marks.items():

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 # Share of the record, at its start, that may hold the start-up transient and is not looked at.
-_START = 0.25
+START = 0.25
 # Steps of the search in cycles over the record, and the widest search around a stated frequency.
 _STEP = 0.1
 _WIDEST = 0.1
@@ -65,7 +65,7 @@ def estimate(time: Array, values: Array, weight: Array, near: float | None) -> L
     -------
     None where no channel holds an oscillation of two periods or more.
     """
-    late = time >= time[0] + _START * (time[-1] - time[0])
+    late = time >= time[0] + START * (time[-1] - time[0])
     t, y, w = time[late] - time[0], values[late], weight[late] / weight[late].mean()
     span = float(t[-1] - t[0]) if t.size else 0.0
     if t.size < _FEWEST or span <= 0.0 or (near is not None and near * span < 2.0):

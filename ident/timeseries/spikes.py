@@ -20,7 +20,7 @@ _HALF = _WINDOW // 2
 _KEPT, _FEWEST = 1 << 12, 40
 # Further from the median than so many robust standard deviations, so many of the large steps and this part of the
 # range; where more than a twentieth is, it is the channel's way.
-_FAR, _STEPS, _LARGE, _RANGE, _MOST = 12.0, 1.5, 0.9, 0.05, 0.05
+_FAR, _STEPS, _LARGE, _RANGE, _MOST = 12.0, 2.2, 0.9, 0.05, 0.05
 
 
 class Surroundings:
