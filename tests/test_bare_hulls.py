@@ -14,6 +14,8 @@ from ident.identification.identify import identify
 from sim.boat.parts import vehicle_terms
 from sim.boat.vehicle import load_vehicle
 from sim.files.errors import InputError
+from sim.flight.case import load_case
+from sim.flight.simulate import initial_state
 
 ROWS = """run_id,test,part,U_mps,alpha_deg,beta_deg,X_N,Y_N,N_Nm,rel_sigma,quality,source
 a,drift_horizontal,hull,2,0,-6,-40,110,240,0.03,as_published,made
@@ -49,6 +51,8 @@ def test_what_needs_a_propeller_or_a_sail_top_asks_for_it(bare):
     vehicle = load_vehicle(bare / "bare.toml")
     with pytest.raises(InputError, match=r"key propeller: nothing .*a flight needs it"):
         vehicle.needed_propeller("a flight")
+    with pytest.raises(InputError, match=r"key propeller: nothing .*self-propulsion needs it"):
+        initial_state(load_case("hzz20")[0], vehicle, None)
     with pytest.raises(InputError, match=r"particulars\.sail_top"):
         vehicle.needed_sail_top("a depth")
     (bare / "runs.csv").write_text(ROWS.replace("a,drift_horizontal,hull", "a,drift_horizontal,propeller"), "utf-8")

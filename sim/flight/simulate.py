@@ -75,9 +75,11 @@ def initial_state(case: Case, vehicle: Vehicle, model: Model) -> tuple[Array, Ar
     sim.flight.trim.NoEquilibrium
         When there is no self-propulsion state within the limits of planes and propeller.
     InputError
-        For a start that is not in the sea.
+        For a start that is not in the sea, or self-propulsion without a propeller.
     """
     first = case.initial
+    if first.state == "self_propulsion":
+        vehicle.needed_propeller("self-propulsion")
     check_start(case, vehicle)
     if first.state == "self_propulsion":
         mixer = mixer_of(vehicle, case.sail_planes)

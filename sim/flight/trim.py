@@ -136,7 +136,8 @@ def _closest(state: Array, controls: Array, mixer: Array) -> str:
     if not np.isfinite([*angles, pitch, revolutions]).all() or max(np.abs(angles).max(initial=0.0), abs(pitch)) > 90.0:
         return "the search leaves all upright attitudes: planes, thrust and weight do not balance there"
     shown = ", ".join(f"{a:.1f}" for a in angles)
-    return f"closest state: planes {shown} deg, pitch {pitch:.1f} deg, n {revolutions:.3g} 1/s"
+    planes = f"planes {shown} deg" if angles.size else "no planes to hold it level"
+    return f"closest state: {planes}, pitch {pitch:.1f} deg, n {revolutions:.3g} 1/s"
 
 
 @dataclass(frozen=True)
