@@ -130,6 +130,7 @@ SLIPS = {
     "pounds in the moment by pitch": (
         "starter", "arm_q.csv", times("M_Nm", 1 / 4.448), "proportion", "error", "Z_uq"),
     "a torque rounded to nothing": ("starter", "open_water.csv", times("KQ", 0.0), "open_water", "error", "KQ = 0"),
+    "degrees in a term of a turn": ("nps-auv2", "published.csv", value("X_rr", 57.3), "proportion", "error", "X_rr"),
     "roll inertia": ("starter", "acceleration_pdot.csv", times("K_Nm", 0.01), "proportion", "error", "K_pdot"),
     "a cross term turned": ("remus100", "published.csv", value("M_uwa", -1.0), "proportion", "error", "M_uwa"),
     "one of a table's sign": ("nps-auv2", "published.csv", value("X_vr", -1.0), "proportion", "error", "X_vr"),
