@@ -27,12 +27,12 @@ def recipe(language):
 def test_the_term_of_the_recipe_is_a_row_of_the_table():
     table = (ROOT / "sim" / "data" / "terms.csv").read_text("utf-8").splitlines()
     (row,) = csv.DictReader([table[0], recipe("text")])
-    term = catalogue._term(row)
+    term = catalogue.read_term(row)
     catalogue.check(term)
     assert term.name not in {t.name for t in catalogue.terms("gertler_hagen")}
     assert (term.factors, term.output, term.power, term.axes) == (("v", "v", "v/U"), "N", 3, ())
     with pytest.raises(catalogue.CatalogueError, match="row N_vvv"):
-        catalogue.check(catalogue._term(row | {"multiplier": "v*v*v/T"}))
+        catalogue.check(catalogue.read_term(row | {"multiplier": "v*v*v/T"}))
 
 
 def test_the_reader_of_the_recipe_reads_and_refuses(tmp_path):

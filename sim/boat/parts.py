@@ -9,7 +9,6 @@ import numpy as np
 
 from sim.boat import catalogue
 from sim.boat.catalogue import MIRROR_OUTPUT, Term
-from sim.boat.own_terms import own_terms
 from sim.boat.vehicle import Plane, Vehicle
 from sim.files.errors import InputError
 
@@ -43,6 +42,9 @@ def all_terms(vehicle: Vehicle) -> tuple[Term, ...]:
     """
     if vehicle.terms is None:
         return catalogue.terms(vehicle.term_set)
+    # Few vehicles have any.
+    from sim.boat.own_terms import own_terms
+
     path = Path(vehicle.terms)
     changed = path.stat().st_mtime_ns if path.is_file() else 0
     added = own_terms(vehicle.terms, vehicle.term_set, changed)
