@@ -321,3 +321,17 @@ def test_a_model_that_floats_has_its_weight_below_its_buoyancy(place, change, na
     evidence = evidence_of(replace(campaign, header=header))
     seen = [c for f in function(evidence, rules()["model_inertia"]) for c in f.columns]
     assert list(dict.fromkeys(seen)) == named
+
+
+@pytest.mark.parametrize("factor", [1e-3, 1e3])
+def test_no_quality_word_excuses_a_plane_moment_of_another_unit(tmp_path, factor):
+    """The rows that carry the planes' lift on have three times their errors; a moment in kN m is none of them."""
+    folder = tmp_path / "bb2"
+    shutil.copytree(ROOT / "raw_captive_data" / "bb2", folder)
+    path = folder / "plane_lift_continued.csv"
+    table = pd.read_csv(path, dtype=str, keep_default_na=False)
+    table["M_Nm"] = [f"{factor * float(x):.6g}" for x in table["M_Nm"]]
+    table.to_csv(path, index=False)
+    listed = [f for f in check_campaign(read_campaign(folder), folder) if f.severity == "error"]
+    # Four stern planes and the pair on the sail.
+    assert [(f.check, f.file, f.columns) for f in listed] == [("levers", "plane_lift_continued.csv", ("M",))] * 5

@@ -10,8 +10,9 @@ from importlib.resources import files
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
-from ident.checks.findings import Body, Evidence, Finding, Rule, check, declared, kept, milder, prime, together
+from ident.checks.findings import Array, Body, Evidence, Finding, Rule, check, declared, kept, milder, prime, together
 from ident.identification.solver import Solver, check_levers
 from sim.boat.catalogue import ACCELERATIONS, OUTPUTS
 from sim.boat.parts import vehicle_terms
@@ -102,7 +103,8 @@ def plane_levers(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
             continue
         forces = group[["X", "Y", "Z"]].fillna(0.0).to_numpy()
         moments = group[["K", "M", "N"]].to_numpy()
-        wrong = np.abs(moments - np.cross(places[str(part)], forces))
+        made = np.cross(places[str(part)], forces)
+        wrong = np.abs(moments - made)
         allowed = rule.limits["share"] * body.length * np.linalg.norm(forces, axis=1)
         given = np.column_stack([kept(group, o) for o in "KMN"])
         bad = given & (wrong > allowed[:, None]) & (moments != 0.0)
@@ -110,11 +112,24 @@ def plane_levers(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
             row, column = np.unravel_index(int(np.where(bad, wrong / allowed[:, None], 0.0).argmax()), bad.shape)
             name = "KMN"[column]
             what = f"{name} = {moments[row, column]:.4g} of run {group['run_id'].iloc[row]}, but force and place of "
-            expected = np.cross(places[str(part)], forces)[row, column]
-            what += f"{part} give {expected:.4g}; {int(bad.any(axis=1).sum())} of {len(group)} runs"
+            what += f"{part} give {made[row, column]:.4g}; {int(bad.any(axis=1).sum())} of {len(group)} runs"
             columns = [o for o, any_ in zip("KMN", bad.any(axis=0), strict=True) if any_]
             known = bool(declared(evidence, group[bad.any(axis=1)]).all())
-            yield rule.finding(str(file), group["row"][bad.any(axis=1)], columns, what, milder(rule, known))
+            # No word for the quality of a run says that its loads act elsewhere: a unit does.
+            sure = given & (np.abs(made) > allowed[:, None])
+            severity = "error" if _other_unit(moments, made, sure, rule.limits["unit"]) else milder(rule, known)
+            yield rule.finding(str(file), group["row"][bad.any(axis=1)], columns, what, severity)
+
+
+def _other_unit(moments: Array, made: Array, sure: NDArray[np.bool_], factor: float) -> bool:
+    """Whether moments about some axis are, in the median, so many times what forces and places make, or a part."""
+    for column in range(3):
+        of = sure[:, column] & (moments[:, column] != 0.0)
+        if of.any():
+            ratio = float(np.median(np.abs(moments[of, column] / made[of, column])))
+            if not 1.0 / factor <= ratio <= factor:
+                return True
+    return False
 
 
 @check("levers")
