@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from test_more_habits_of_oscillations import (
+from made_oscillations import (
     ACCELERATION,
     DAMPING,
     INERTIA,
