@@ -147,6 +147,12 @@ SLIPS = {
         "starter", "open_water.csv", times("KT", 0.6), "open_water", "warning", "at J = 0"),
     "torque of half at rest": (
         "starter", "open_water.csv", times("KQ", 0.4), "open_water", "error", "at J = 0"),
+    "a curve of way astern": (
+        "suboff", "stand_in_propeller.csv", times("J", -1.0), "open_water", "error", "of none above"),
+    "a thrust of the row beside": (
+        "starter", "open_water.csv", put("OW-0.2", "KT", "0.45"), "open_water", "warning", "at J = 0, 0.2"),
+    "a drift test of the other angle": (
+        "starter", DRIFT, lambda t: t.assign(test="drift_vertical"), "rows", "warning", "beta and none has alpha"),
     "an error of the whole load": (
         "starter", "rudders.csv", put("rudders-06", "rel_sigma", "0.902"), "errors", "warning", "hardly count"),
 }  # fmt: skip

@@ -98,13 +98,31 @@ def propulsion_beyond_the_curve(evidence: Evidence, rule: Rule) -> Iterator[Find
 
 @check("open_water")
 def one_advance_below_zero(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
-    """A single J below zero in a curve of positive ones: nobody measures one point astern."""
+    """A single J below zero in a curve of positive ones, or no J above zero: nobody measures that."""
     tested = evidence.runs[evidence.runs["test"] == "open_water"]
     for file, group in tested.groupby("file", sort=False):
         astern = group[group["J"] < 0.0]
-        if len(astern) == 1 and int((group["J"] > 0.0).sum()) >= rule.limits["ahead"]:
+        ahead = int((group["J"] > 0.0).sum())
+        if len(astern) == 1 and ahead >= rule.limits["ahead"]:
             what = f"J = {astern['J'].iloc[0]:g} in run {astern['run_id'].iloc[0]}, all others ahead: its sign?"
             yield rule.finding(str(file), rows_of(astern), ["J"], what, "warning")
+        if len(astern) >= rule.limits["ahead"] and not ahead:
+            what = f"J of {len(astern)} runs is below zero and of none above: a curve of way astern alone, or the sign?"
+            yield rule.finding(str(file), rows_of(astern), ["J"], what)
+
+
+@check("open_water")
+def one_value_at_two_advances(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
+    """The same KT or KQ at two J, or the same J of two: a value of the row beside it."""
+    tested = evidence.runs[evidence.runs["test"] == "open_water"]
+    for file, group in tested.groupby("file", sort=False):
+        for name in ("KT", "KQ"):
+            given = group[kept(group, name) & (group[name] != 0.0)].drop_duplicates(["J", name])
+            twice = given[given.duplicated(name, keep=False)]
+            if not twice.empty:
+                ratios = ", ".join(f"{j:g}" for j in twice["J"])
+                what = f"{name} = {twice[name].iloc[0]:g} at J = {ratios}: of the row beside it?"
+                yield rule.finding(str(file), rows_of(twice), [name], what, "warning")
 
 
 @check("open_water")

@@ -73,6 +73,21 @@ def a_run_of_another_test(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
 
 
 @check("rows")
+def runs_without_their_motion(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
+    """Runs of one drift test that have the angle of the other: the word in ``test``, or the column of the angle."""
+    runs = evidence.runs
+    for test, own, other in (("drift_horizontal", "beta", "alpha"), ("drift_vertical", "alpha", "beta")):
+        tested = runs[runs["test"] == test]
+        # Histories have a file a run: those of a source are looked at together.
+        alone = tested.groupby("file")["file"].transform("size") == 1
+        for file, group in tested.groupby(tested["file"].where(~alone, together(tested)), sort=False):
+            turned = group[group[other].fillna(0.0).abs() > _NONE]
+            if len(turned) > 1 and (group[own].fillna(0.0).abs() <= _NONE).all():
+                what = f"{len(turned)} runs of {test} have {other} and none has {own}"
+                yield rule.finding(str(file), rows_of(turned), ["test", other], what)
+
+
+@check("rows")
 def a_load_at_rest(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
     """Loads of a body that neither moves nor is moved: water at rest makes none, and no coefficient takes them."""
     runs = evidence.runs
