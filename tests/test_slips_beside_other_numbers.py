@@ -8,12 +8,13 @@ from __future__ import annotations
 import re
 import shutil
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
-from sample_of_mutations import STARTER, TABLES
+from made_copies import copied
 
 from ident.captive.campaign import read_campaign
 from ident.captive.run_table import run_table
@@ -35,20 +36,8 @@ CHECKS = (
 
 @pytest.fixture
 def place(tmp_path):
-    """A folder with a copy of a campaign, by name."""
-
-    def copied(boat: str) -> Path:
-        if boat != "starter":
-            shutil.copytree(ROOT / "raw_captive_data" / boat, tmp_path / boat)
-            return tmp_path / boat
-        shutil.copytree(STARTER, tmp_path / boat)
-        folder = tmp_path / boat / "captive"
-        shutil.rmtree(folder / "histories")
-        header = folder / "campaign.toml"
-        header.write_text(TABLES.match(header.read_text("utf-8"))[0], "utf-8")
-        return folder
-
-    return copied
+    """Copies a campaign, by name."""
+    return partial(copied, tmp_path)
 
 
 def found(folder: Path) -> list[tuple[str, str, str]]:

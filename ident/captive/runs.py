@@ -106,8 +106,8 @@ def _jobs(
 ) -> Iterator[tuple[Path, Path, Source, CampaignFile, str]]:
     """What is read: each file, or each table of a file where ``table`` stands for several; their name then."""
     for path in paths:
-        idle = idle_keys(source, reader_of(path, source))
-        names = tables_of(path, source) if source.table and not idle else [source.table]
+        stated = bool(source.table) and not idle_keys(source, reader_of(path, source))
+        names = tables_of(path, source) if stated else [source.table]
         for name in names:
             many = "" if name == source.table else name
             yield folder, path, source.model_copy(update={"table": name}) if many else source, header, many

@@ -11,6 +11,7 @@ import pandas as pd
 from ident.captive.axes import from_flow
 from ident.checks.findings import (
     HULL,
+    NONE,
     Body,
     Evidence,
     Finding,
@@ -26,8 +27,6 @@ from ident.checks.findings import (
 from sim.boat.catalogue import ACCELERATIONS
 
 _PLANES = {"drift_horizontal": ("beta", "Y", "N"), "drift_vertical": ("alpha", "Z", "M")}
-# Rounding of an angle that is none [rad].
-_NO_ANGLE = 1e-6
 _MOVING = ("p", "q", "r", *ACCELERATIONS)
 
 
@@ -41,7 +40,7 @@ def _sweep(runs: pd.DataFrame, test: str, angle: str) -> pd.DataFrame:
     other = "alpha" if angle == "beta" else "beta"
     if of_test[other].fillna(0.0).abs().round(6).nunique() < 3:
         return of_test
-    return of_test[of_test[other].fillna(0.0).abs() < _NO_ANGLE]
+    return of_test[of_test[other].fillna(0.0).abs() < NONE]
 
 
 @check("flow_axes")

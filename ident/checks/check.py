@@ -50,6 +50,7 @@ from ident.checks.findings import (
     NotYetError,
     RunsAlone,
     function_name,
+    of_air,
     registered,
     rules,
 )
@@ -105,8 +106,8 @@ def evidence_of(campaign: Campaign, folder: Path | None = None) -> Evidence:
     """
     particulars, header = campaign.vehicle.particulars, campaign.header
     # In a wind tunnel the body displaces air.
-    limits, density = rules()["fluid"].limits, header.fluid.density_kgpm3
-    thinner = density / limits["water"] if density < limits["air_high"] else 1.0
+    density = header.fluid.density_kgpm3
+    thinner = density / rules()["fluid"].limits["water"] if of_air(density) else 1.0
     mass = particulars.displaced_mass.value * thinner
     x, y, z = (particulars.mass.value * thinner * k**2 for k in particulars.radius_of_gyration.value)
     length, scale = particulars.length.value, header.scale

@@ -25,6 +25,8 @@ Array = NDArray[np.float64]
 SEVERITIES = ("info", "warning", "error")
 # Part of a run of the whole hull, named or not.
 HULL = ("hull", "")
+# An angle [rad] or a rate [rad/s] below this is none.
+NONE = 1e-6
 
 
 @dataclass(frozen=True)
@@ -270,6 +272,11 @@ def dynamic(runs: pd.DataFrame, body: Body) -> pd.Series:
 def prime(runs: pd.DataFrame, output: str, body: Body) -> pd.Series:
     """Dimensionless load of every run: forces over ``dynamic``, moments over that times L."""
     return runs[output] / dynamic(runs, body) / (1.0 if output in "XYZ" else body.length)
+
+
+def of_air(density: float) -> bool:
+    """Whether a density [kg/m^3] is that of a wind tunnel, whose speeds keep no law of Froude's."""
+    return density < rules()["fluid"].limits["air_high"]
 
 
 def kept(runs: pd.DataFrame, output: str) -> pd.Series:

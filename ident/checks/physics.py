@@ -12,7 +12,20 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from ident.checks.findings import Array, Body, Evidence, Finding, Rule, check, declared, kept, milder, prime, together
+from ident.checks.findings import (
+    NONE,
+    Array,
+    Body,
+    Evidence,
+    Finding,
+    Rule,
+    check,
+    declared,
+    kept,
+    milder,
+    prime,
+    together,
+)
 from ident.identification.solver import Solver, check_levers
 from sim.boat.catalogue import ACCELERATIONS, OUTPUTS
 from sim.boat.parts import vehicle_terms
@@ -229,10 +242,6 @@ def _apparent_inertia(runs: pd.DataFrame) -> Iterator[tuple[str, str, pd.DataFra
             yield str(file), acceleration, group, -float(x @ y / (x @ x))
 
 
-# Rounding of an angle [rad].
-_SAME_ANGLE = 1e-6
-
-
 def _of_acceleration(runs: pd.DataFrame, acceleration: str, output: str) -> pd.Series:
     """A load less what the opposed instants of an oscillation have in common; NaN where resistance is in it."""
     cycle = runs["file"].astype(str) + "/" + runs["run_id"].astype(str).str.extract(r"^(.*)[+-]a$")[0]
@@ -243,7 +252,7 @@ def _of_acceleration(runs: pd.DataFrame, acceleration: str, output: str) -> pd.S
         return load.mask(way)
     # A body that swings about an axis on a straight path has the load of its angle in it.
     ends = runs.loc[opposed, ["alpha", "beta"]].fillna(0.0).groupby(cycle[opposed])
-    swung = ((ends.transform("max") - ends.transform("min")) > _SAME_ANGLE).any(axis=1)
+    swung = ((ends.transform("max") - ends.transform("min")) > NONE).any(axis=1)
     return load.mask(way | swung.reindex(runs.index, fill_value=False))
 
 

@@ -14,7 +14,7 @@ import pandas as pd
 from ident.captive.campaign import Campaign
 from ident.captive.conversions import turning
 from ident.captive.run_table import MEASURED
-from ident.checks.findings import Evidence, Finding, Rule, check, factors, kept, rows_of, rules, together
+from ident.checks.findings import Evidence, Finding, Rule, check, factors, kept, of_air, rows_of, together
 from sim.boat.catalogue import ACCELERATIONS, SETS, terms
 from sim.boat.parts import vehicle_terms
 
@@ -34,7 +34,7 @@ def states_of_a_boat(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
         size = np.degrees(runs[name]).abs()
         yield from _beyond(runs, rule, name, size, most, "deg")
     header = evidence.campaign.header if evidence.campaign else None
-    tunnel = header is not None and header.fluid.density_kgpm3 < rules()["fluid"].limits["air_high"]
+    tunnel = header is not None and of_air(header.fluid.density_kgpm3)
     # Full-scale speeds are by Froude's law, which no wind tunnel keeps.
     own = math.sqrt(header.scale.ratio) if tunnel and header is not None else 1.0
     fastest, where = (limits["air"], "m/s in the wind tunnel") if tunnel else (limits["speed"], "m/s at full scale")

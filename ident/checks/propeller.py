@@ -113,15 +113,15 @@ def one_advance_below_zero(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
 
 @check("open_water")
 def one_value_at_two_advances(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
-    """The same KT or KQ at two J, or the same J of two: a value of the row beside it."""
+    """The same KT or KQ at two J: a value of the row beside it."""
     tested = evidence.runs[evidence.runs["test"] == "open_water"]
     for file, group in tested.groupby("file", sort=False):
         for name in ("KT", "KQ"):
             given = group[kept(group, name) & (group[name] != 0.0)].drop_duplicates(["J", name])
             twice = given[given.duplicated(name, keep=False)]
             if not twice.empty:
-                ratios = ", ".join(f"{j:g}" for j in twice["J"])
-                what = f"{name} = {twice[name].iloc[0]:g} at J = {ratios}: of the row beside it?"
+                advances = ", ".join(f"{j:g}" for j in twice["J"])
+                what = f"{name} = {twice[name].iloc[0]:g} at J = {advances}: of the row beside it?"
                 yield rule.finding(str(file), rows_of(twice), [name], what, "warning")
 
 

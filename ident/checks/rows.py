@@ -10,11 +10,8 @@ import numpy as np
 
 from ident.captive.published import TEST as PUBLISHED
 from ident.captive.run_table import STATES
-from ident.checks.findings import HULL, Evidence, Finding, Rule, check, kept, rows_of, together
+from ident.checks.findings import HULL, NONE, Evidence, Finding, Rule, check, kept, rows_of, together
 from sim.boat.catalogue import ACCELERATIONS, OUTPUTS
-
-# An angle or a rate below this is none.
-_NONE = 1e-6
 
 
 @check("rows")
@@ -81,8 +78,8 @@ def runs_without_their_motion(evidence: Evidence, rule: Rule) -> Iterator[Findin
         # Histories have a file a run: those of a source are looked at together.
         alone = tested.groupby("file")["file"].transform("size") == 1
         for file, group in tested.groupby(tested["file"].where(~alone, together(tested)), sort=False):
-            turned = group[group[other].fillna(0.0).abs() > _NONE]
-            if len(turned) > 1 and (group[own].fillna(0.0).abs() <= _NONE).all():
+            turned = group[group[other].fillna(0.0).abs() > NONE]
+            if len(turned) > 1 and (group[own].fillna(0.0).abs() <= NONE).all():
                 what = f"{len(turned)} runs of {test} have {other} and none has {own}"
                 yield rule.finding(str(file), rows_of(turned), ["test", other], what)
 
@@ -176,7 +173,7 @@ def loads_that_fall_as_their_motion_grows(evidence: Evidence, rule: Rule) -> Ite
     hull = (runs["test"] != PUBLISHED) & runs["part"].isin(HULL)
     needed = ["run_id", "test", "U", "file", "row", *(c for c in ("files", "exclude") if c in runs)]
     tested = runs.loc[hull, [*needed, *_MADE, *OUTPUTS]]
-    moving = np.abs(np.nan_to_num(tested[list(_MADE)].to_numpy(float))) > _NONE
+    moving = np.abs(np.nan_to_num(tested[list(_MADE)].to_numpy(float))) > NONE
     for k, (motion, load) in enumerate(_MADE.items()):
         alone = tested[moving[:, k] & (moving.sum(axis=1) == 1)]
         moved = alone[kept(alone, load)] if len(alone) >= rule.limits["falls"] else alone.iloc[:0]

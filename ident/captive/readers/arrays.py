@@ -162,6 +162,35 @@ def array_sheet(
     return Sheet(path, max(first_row - 1, 0), header, values, cells, _PLAIN, first_row)
 
 
+def take_pairs(
+    place: str, cells: Sequence[str], plots: Sequence[tuple[str, dict[float, float]]], dialect: Dialect, of: str = ""
+) -> None:
+    """Enter a row of curves that stand side by side, an abscissa and a value each; a curve that has ended is blank.
+
+    Parameters
+    ----------
+    place : File and row, for the message.
+    cells : Of the row.
+    plots : Name of each curve, and its abscissae and values so far.
+    dialect : How numbers are written.
+    of : Name of the abscissa, where the format has one.
+
+    Raises
+    ------
+    InputError
+        For half of a pair, or what is no number.
+    """
+    for k, (name, series) in enumerate(plots):
+        pair = cells[2 * k : 2 * k + 2]
+        if len(pair) < 2 or not any(pair):
+            continue
+        at, value = (dialect.number(cell) for cell in pair)
+        if at is None or value is None:
+            wanted = f"an {of or 'abscissa'} and a number, or both blank"
+            raise InputError(f"{place}, column {name[:60]}", repr(" ".join(pair)[:60]), wanted)
+        series[at] = value
+
+
 def joined(
     path: Path, names: list[str], plots: list[dict[float, float]], source: Source, row: int, blank: Sequence[str] = ()
 ) -> Sheet:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ident.captive.quantities import known_unit
-from ident.captive.readers.arrays import array_sheet, chosen, joined, needs, of_one_length, with_units
+from ident.captive.readers.arrays import array_sheet, chosen, joined, needs, of_one_length, take_pairs, with_units
 from ident.captive.readers.sheet import Sheet
 from ident.captive.readers.table import open_csv
 from ident.captive.readers.text import Dialect, blocks, head
@@ -147,15 +147,7 @@ def _own_abscissae(path: Path, source: Source, header_row: int, dialect: Dialect
             if any(cells[2 * len(names) + len(blank) :]):
                 most = f"at most {2 * len(names) + len(blank)}, as in the header"
                 raise InputError(f"{path}, row {row}", f"{len(cells)} cells", most)
-            for k, channel in enumerate(series):
-                pair = cells[2 * k : 2 * k + 2]
-                if len(pair) < 2 or not any(pair):
-                    continue
-                at, value = (dialect.number(cell) for cell in pair)
-                if at is None or value is None:
-                    place = f"{path}, row {row}, column {names[k][:60]}"
-                    raise InputError(place, repr(" ".join(pair)[:60]), f"an {_ABSCISSA} and a number, or both blank")
-                channel[at] = value
+            take_pairs(f"{path}, row {row}", cells, list(zip(names, series, strict=True)), dialect, _ABSCISSA)
     if not any(series):
         raise InputError(str(path), "no numbers", "rows below the header")
     # A unit stands below its channel, nothing below its abscissa.

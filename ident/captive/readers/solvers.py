@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ident.captive.readers.arrays import array_sheet, chosen, joined
+from ident.captive.readers.arrays import array_sheet, chosen, joined, take_pairs
 from ident.captive.readers.sheet import Sheet
 from ident.captive.readers.table import open_columns, open_csv
 from ident.captive.readers.text import Dialect, blocks, head
@@ -141,15 +141,7 @@ def open_plots(path: Path, source: Source, dialect: Dialect) -> Sheet:
     for row, cells in lines[1:] if ended else lines[1:-1]:
         if any(cells[len(names) :]):
             raise InputError(f"{path}, row {row}", f"{len(cells)} cells", f"at most {len(names)}, as in the header")
-        for k, series in enumerate(plots):
-            pair = cells[2 * k : 2 * k + 2]
-            if len(pair) < 2 or not any(pair):
-                continue
-            at, value = (dialect.number(c) for c in pair)
-            if at is None or value is None:
-                place = f"{path}, row {row}, column {names[2 * k + 1][:60]}"
-                raise InputError(place, repr(" ".join(pair)[:60]), "an abscissa and a number, or both blank")
-            series[at] = value
+        take_pairs(f"{path}, row {row}", cells, list(zip(names[1::2], plots, strict=True)), dialect)
     return joined(path, [names[0], *names[1::2]], plots, source, lines[0][0])
 
 
