@@ -15,8 +15,7 @@ from ident.captive.campaign import Campaign
 from ident.captive.conversions import turning
 from ident.captive.run_table import MEASURED
 from ident.checks.findings import Evidence, Finding, Rule, check, factors, kept, of_air, rows_of, together
-from sim.boat.catalogue import ACCELERATIONS, SETS, terms
-from sim.boat.parts import vehicle_terms
+from sim.boat.catalogue import ACCELERATIONS, SETS, held, terms
 
 # Files that hold runs when a campaign's source names them.
 _TABLES = frozenset((".csv", ".parquet", ".xlsx", ".xls", ".xlsb", ".ods", ".mat", ".h5", ".nc", ".tdms", ".lvm"))
@@ -77,7 +76,7 @@ def _beyond(runs: pd.DataFrame, rule: Rule, name: str, size: pd.Series, most: fl
 def motions_without_a_load(evidence: Evidence, rule: Rule) -> Iterator[Finding]:
     """Incidence or pitching of a vehicle that moves in the horizontal plane alone: no term has a load of it."""
     runs, vehicle = evidence.runs, evidence.vehicle
-    if vehicle is None or {"Z", "M"} & {term.output for term in vehicle_terms(vehicle)}:
+    if vehicle is None or not {"Z", "M"} <= set(held(vehicle.term_set)):
         return
     for name in ("alpha", "q"):
         moved = runs[runs[name].fillna(0.0) != 0.0]

@@ -39,10 +39,7 @@ _DIMENSIONS = (
 # States at which two products of factors are compared: any, with every sign; ahead, as the runs of a tank are.
 _SIDES = ((1, 1, 1), (-1, 1, 1), (1, -1, 1), (1, 1, -1), (-1, -1, 1), (-1, 1, -1), (2, -1, -1))
 _STATES = tuple(
-    ((2.0 + 0.3 * k, 0.31 * a, -0.17 * b), (0.11 * b, 0.05 * c, -0.07 * a * c))
-    for k, (a, b, c) in enumerate(
-        [(1, 1, 1), (-1, 1, 1), (1, -1, 1), (1, 1, -1), (-1, -1, 1), (-1, 1, -1), (2, -1, -1)]
-    )
+    ((2.0 + 0.3 * k, 0.31 * a, -0.17 * b), (0.11 * b, 0.05 * c, -0.07 * a * c)) for k, (a, b, c) in enumerate(_SIDES)
 )
 
 
